@@ -1,0 +1,3 @@
+//! The `arbiter3d` command.
+
+fn main() {}

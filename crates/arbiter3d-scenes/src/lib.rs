@@ -1,0 +1,1 @@
+//! Named scenes, built through the public API of `arbiter3d`.
