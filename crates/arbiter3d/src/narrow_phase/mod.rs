@@ -111,3 +111,6 @@ fn mirror(pose: &Pose, manifold: &mut Manifold) {
         point.normal = -pose.rotation.rotate(point.normal);
     }
 }
+
+#[cfg(test)]
+mod tests;
