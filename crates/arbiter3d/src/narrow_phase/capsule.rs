@@ -12,7 +12,7 @@ use super::polyhedron::{CuboidFeatures, Polyhedron};
 use super::sphere::{any_perpendicular, push_rounded};
 use super::{Manifold, ManifoldPoint};
 use crate::math::{Pose, Real, Vec3, clamp, max, min, normalize_or};
-use crate::shape::{Capsule, Cuboid};
+use crate::shape::{Capsule, ConvexHull, Cuboid};
 
 /// Segments whose angle has a sine below this are parallel: two points.
 const PARALLEL_SINE: Real = 0.05;
@@ -64,6 +64,11 @@ pub(crate) fn cuboid_capsule(a: &Cuboid, b: &Capsule, pose: &Pose, margin: Real,
     polyhedron_capsule(&features.view(), &Support::Cuboid(*a), b, pose, (margin, manifold));
 }
 
+/// Hull (shape 1) against capsule.
+pub(crate) fn hull_capsule(a: &ConvexHull, b: &Capsule, pose: &Pose, margin: Real, manifold: &mut Manifold) {
+    polyhedron_capsule(&Polyhedron::from_hull(a), &Support::Hull(a), b, pose, (margin, manifold));
+}
+
 /// A capsule beside a polyhedron, in the frame of the latter.
 struct CapsulePair<'a> {
     polyhedron: &'a Polyhedron<'a>,
@@ -74,7 +79,7 @@ struct CapsulePair<'a> {
 }
 
 /// Polyhedron (shape 1, `support` its support map) against capsule.
-pub(crate) fn polyhedron_capsule(
+fn polyhedron_capsule(
     polyhedron: &Polyhedron,
     support: &Support,
     capsule: &Capsule,
@@ -137,7 +142,11 @@ impl CapsulePair<'_> {
                 continue;
             }
             let (a, b) = self.polyhedron.edge_points(edge);
-            let axis = normalize_or((b - a).cross(direction), n1);
+            let cross = (b - a).cross(direction);
+            if cross.length_squared() < 1e-5 * (b - a).length_squared() * direction.length_squared() {
+                continue; // Parallel: the faces beside the edge stand in.
+            }
+            let axis = normalize_or(cross, n1);
             let axis = if axis.dot(n1 + n2) < 0.0 { -axis } else { axis };
             let gap = axis.dot(self.ends[0] - a);
             if gap > best {

@@ -15,6 +15,7 @@ mod capsule;
 mod clip;
 mod cuboid;
 mod distance;
+mod hull;
 mod manifold;
 mod mesh;
 mod polyhedron;
@@ -98,6 +99,10 @@ fn collide_sorted(
         (Shape::Cuboid(a), Shape::Sphere(b)) => sphere::cuboid_sphere(a, b, pose, margin, manifold),
         (Shape::Capsule(a), Shape::Capsule(b)) => capsule::capsule_capsule(a, b, pose, margin, manifold),
         (Shape::Cuboid(a), Shape::Capsule(b)) => capsule::cuboid_capsule(a, b, pose, margin, manifold),
+        (Shape::Hull(a), Shape::Sphere(b)) => sphere::hull_sphere(a, b, pose, margin, manifold),
+        (Shape::Hull(a), Shape::Capsule(b)) => capsule::hull_capsule(a, b, pose, margin, manifold),
+        (Shape::Hull(a), Shape::Cuboid(b)) => hull::hull_cuboid(a, b, pose, margin, (cache, manifold)),
+        (Shape::Hull(a), Shape::Hull(b)) => hull::hull_hull(a, b, pose, margin, (cache, manifold)),
         (Shape::Mesh(_), Shape::Mesh(_)) => manifold.clear(),
         (Shape::Mesh(a), convex) => mesh::collide(a, convex, pose, margin, cache, manifold),
         _ => manifold.clear(),

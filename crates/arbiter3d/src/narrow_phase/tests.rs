@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::math::{Rotation, Vec3};
+use crate::shape::ConvexHull;
 use glam::{DMat3, DVec3};
 
 /// Numbers that repeat from run to run (Marsaglia's xorshift, 2003).
@@ -155,8 +156,130 @@ fn a_b_mirrors_b_a() {
     assert!(touching > 1000);
 }
 
+fn box_hull(h: Vec3) -> Shape {
+    let corner = |i: u32| {
+        let sign = |bit: u32, x: Real| if i >> bit & 1 == 1 { x } else { -x };
+        Vec3::new(sign(0, h.x), sign(1, h.y), sign(2, h.z))
+    };
+    Shape::hull(&(0..8).map(corner).collect::<Vec<_>>()).unwrap()
+}
+
+fn random_hull(random: &mut Random, count: usize, size: Real) -> Shape {
+    let shift = random.vector() * 0.2 * size;
+    let points: Vec<Vec3> =
+        (0..count).map(|_| random.direction() * random.between(0.5, 1.0) * size + shift).collect();
+    Shape::hull(&points).unwrap()
+}
+
+/// The largest gap of two convex polyhedra over all face normals and all products of edges, by brute force.
+fn hull_oracle(a: &ConvexHull, b: &ConvexHull, pose: &Pose) -> f64 {
+    let (m, t) = (matrix(pose.rotation), pose.position.as_dvec3());
+    let v1: Vec<DVec3> = a.vertices().iter().map(|v| v.as_dvec3()).collect();
+    let v2: Vec<DVec3> = b.vertices().iter().map(|v| m * v.as_dvec3() + t).collect();
+    let edges = |hull: &ConvexHull, v: &[DVec3]| -> Vec<DVec3> {
+        let e = hull.edges();
+        (0..e.len()).step_by(2).map(|k| v[e[k ^ 1].origin as usize] - v[e[k].origin as usize]).collect()
+    };
+    let mut axes: Vec<DVec3> = a.planes().iter().map(|p| p.normal.as_dvec3()).collect();
+    axes.extend(b.planes().iter().map(|p| -(m * p.normal.as_dvec3())));
+    let (edges1, edges2) = (edges(a, &v1), edges(b, &v2));
+    for e1 in &edges1 {
+        for e2 in &edges2 {
+            let n = e1.cross(*e2);
+            if n.length() > 1e-6 * e1.length() * e2.length() {
+                axes.extend([n, -n]);
+            }
+        }
+    }
+    axes.iter().fold(f64::MIN, |best, n| best.max(points_gap(&v1, &v2, n.normalize())))
+}
+
+fn points_gap(v1: &[DVec3], v2: &[DVec3], n: DVec3) -> f64 {
+    let high = v1.iter().fold(f64::MIN, |m, v| m.max(v.dot(n)));
+    let low = v2.iter().fold(f64::MAX, |m, v| m.min(v.dot(n)));
+    low - high
+}
+
+#[test]
+fn a_box_as_a_hull_is_as_deep_as_the_cuboid() {
+    let mut random = Random(0x0DDB_A115_0DDB_A115);
+    let mut touching = 0;
+    for _ in 0..10_000 {
+        let mut half = || Vec3::new(random.between(0.1, 1.0), random.between(0.1, 1.0), random.between(0.1, 1.0));
+        let (h1, h2) = (half(), half());
+        let pose = Pose::new(random.vector() * 1.5, random.rotation());
+        let (a, b) = (Shape::cuboid(h1).unwrap(), Shape::cuboid(h2).unwrap());
+        let expected = contacts(&a, &b, &pose, 0.0);
+        let size = h1.min_element().min(h2.min_element());
+        for (a, b) in [(box_hull(h1), box_hull(h2)), (box_hull(h1), b.clone()), (a.clone(), box_hull(h2))] {
+            let found = contacts(&a, &b, &pose, 0.0);
+            assert_sound(&found, size, 0.0);
+            let oracle = box_oracle(h1.as_dvec3(), h2.as_dvec3(), &matrix(pose.rotation), pose.position.as_dvec3());
+            if oracle.abs() < 1e-2 * f64::from(size) {
+                continue;
+            }
+            assert_eq!(found.points().is_empty(), expected.points().is_empty());
+            if !found.points().is_empty() {
+                let difference = (lowest(&found) - lowest(&expected)).abs();
+                // Both may prefer different faces, within the preference.
+                assert!(difference < 9e-3 * size || found.points()[0].normal.dot(expected.points()[0].normal) < 0.999);
+                touching += 1;
+            }
+        }
+    }
+    assert!(touching > 5_000, "{touching}");
+}
+
+#[test]
+fn hulls_agree_with_all_separating_axes_in_double_precision() {
+    let mut random = Random(0xABCD_EF01_2345_6789);
+    let (mut touching, mut lifted) = (0, 0);
+    for round in 0..1200 {
+        let count = 4 + round % 17;
+        let a = random_hull(&mut random, count, 1.0);
+        let b = random_hull(&mut random, 4 + round % 13, 0.7);
+        let (Shape::Hull(ha), Shape::Hull(hb)) = (&a, &b) else { unreachable!() };
+        let pose = Pose::new(random.direction() * random.between(0.2, 1.8), random.rotation());
+        let oracle = hull_oracle(ha, hb, &pose) as Real;
+        let m = contacts(&a, &b, &pose, 0.0);
+        let size = min_size(&a, &b);
+        assert_sound(&m, size, 0.0);
+        assert!(oracle >= -1e-5 || !m.points().is_empty(), "overlap {oracle} lost");
+        assert!(oracle <= 1e-5 || m.points().is_empty(), "apart {oracle}");
+        if m.points().is_empty() {
+            continue;
+        }
+        touching += 1;
+        let n = m.points()[0].normal.as_dvec3();
+        let r = matrix(pose.rotation);
+        let v1: Vec<DVec3> = ha.vertices().iter().map(|v| v.as_dvec3()).collect();
+        let v2: Vec<DVec3> = hb.vertices().iter().map(|v| r * v.as_dvec3() + pose.position.as_dvec3()).collect();
+        let gap = points_gap(&v1, &v2, n) as Real;
+        assert!(gap <= oracle + 1e-4 && gap >= oracle - 8e-3 * size - 1e-4, "{gap} {oracle}");
+        assert!(lowest(&m) >= gap - 1e-4);
+        lifted += (lowest(&m) > 0.0) as u32;
+        // Remembering the last axis changes nothing.
+        let mut cache = PairCache::default();
+        let mut again = Manifold::EMPTY;
+        for _ in 0..2 {
+            collide(&a, &b, &pose, 0.0, &mut cache, &mut again);
+            assert_eq!(again.points(), m.points());
+        }
+    }
+    eprintln!("touching {touching} lifted {lifted}");
+    assert!(touching > 400 && lifted == 0);
+}
+
+fn min_size(a: &Shape, b: &Shape) -> Real {
+    crate::math::min(a.inner_radius(), b.inner_radius())
+}
+
 fn shapes() -> Vec<Shape> {
+    let mut random = Random(0x5555_AAAA_1234_8765);
     vec![
+        random_hull(&mut random, 12, 0.6),
+        random_hull(&mut random, 30, 0.5),
+        box_hull(Vec3::new(0.4, 0.3, 0.3)),
         Shape::sphere(0.3).unwrap(),
         Shape::capsule(0.5, 0.2).unwrap(),
         Shape::cuboid(Vec3::new(0.3, 0.5, 0.4)).unwrap(),
