@@ -1,0 +1,447 @@
+//! Convex hulls against hulls and cuboids: separating axes from faces and edge pairs, then a clipped face.
+//!
+//! For a face of one hull the gap is that of its plane to the lowest corner of the other hull. A pair of edges gives a candidate
+//! only where it makes a face of the Minkowski difference: where the arcs that join the normals of their faces cross on the
+//! unit sphere (Gregorius, "The Separating Axis Test between Convex Polyhedra", GDC 2013). With edge directions `e1`, `e2`,
+//! face normals `a`, `b` left and right of `e1`, and `c`, `d` of `e2`, they cross when
+//!
+//! ```text
+//! (c · e1)(d · e1) < 0,   (a · e2)(b · e2) < 0,   (c · e1)(b · e2) < 0
+//! ```
+//!
+//! Most candidates are never looked at. The other hull holds a ball of radius `r` about its centre `m`, so the gap along a unit
+//! normal `n` that supports this hull at `v` is at most `n · (m − v) − r`. For an edge, `n` is on the arc between two normals, and
+//! `n · (m − v)` is at most the larger of the values at its ends, over the cosine of half the arc where that is positive. What
+//! cannot beat the best gap so far is skipped; in round hulls this leaves the few features next to the contact.
+//!
+//! The cache holds the last axis. It only ends the search early, when the hulls are still apart along it.
+
+use super::clip::{ClipPoint, clip_polygon, reduce};
+use super::distance::{Support, closest};
+use super::polyhedron::{CuboidFeatures, Polyhedron};
+use super::{Manifold, ManifoldPoint, PairCache};
+use crate::math::{Mat3, Pose, Real, Vec3, clamp, max, min, normalize_or};
+use crate::shape::{ConvexHull, Cuboid, HalfEdge};
+
+/// A face of hull 2 is the reference when it is better by this share of the smaller inner radius.
+const FACE_BIAS: Real = 2e-3;
+/// An edge pair makes the contact when it is better by this share of the smaller inner radius.
+const EDGE_BIAS: Real = 5e-3;
+/// Share of the smaller inner radius by which side planes are moved out, so that corners on the border stay corners.
+const GROWTH: Real = 1e-4;
+/// Edges with `sin²` of their angle below this are parallel: faces stand in for them.
+const PARALLEL: Real = 1e-5;
+/// Edges of hull 2 that are held in the frame of hull 1 at a time.
+const BATCH: usize = 32;
+
+const FACE1: u32 = 1 << 30;
+const FACE2: u32 = 2 << 30;
+const EDGES: u32 = 3 << 30;
+
+/// Two polyhedra and the placement of the second one in the frame of the first.
+pub(crate) struct HullPair<'a> {
+    pub polyhedron1: Polyhedron<'a>,
+    pub polyhedron2: Polyhedron<'a>,
+    /// Their support maps.
+    pub supports: [Support<'a>; 2],
+    pub pose: Pose,
+    pub margin: Real,
+}
+
+/// Hull (shape 1) against hull.
+pub(crate) fn hull_hull(
+    a: &ConvexHull,
+    b: &ConvexHull,
+    pose: &Pose,
+    margin: Real,
+    (cache, manifold): (&mut PairCache, &mut Manifold),
+) {
+    let (polyhedron1, polyhedron2) = (Polyhedron::from_hull(a), Polyhedron::from_hull(b));
+    let supports = [Support::Hull(a), Support::Hull(b)];
+    HullPair { polyhedron1, polyhedron2, supports, pose: *pose, margin }.collide(cache, manifold);
+}
+
+/// Hull (shape 1) against cuboid.
+pub(crate) fn hull_cuboid(
+    a: &ConvexHull,
+    b: &Cuboid,
+    pose: &Pose,
+    margin: Real,
+    (cache, manifold): (&mut PairCache, &mut Manifold),
+) {
+    let features = CuboidFeatures::new(b);
+    let (polyhedron1, polyhedron2) = (Polyhedron::from_hull(a), features.view());
+    let supports = [Support::Hull(a), Support::Cuboid(*b)];
+    HullPair { polyhedron1, polyhedron2, supports, pose: *pose, margin }.collide(cache, manifold);
+}
+
+/// An axis as the cache holds it, and the gap along it.
+#[derive(Clone, Copy)]
+struct Axis {
+    code: u32,
+    gap: Real,
+}
+
+/// An edge with the normals of its faces, all in the frame of hull 1.
+#[derive(Clone, Copy, Default)]
+struct Edge {
+    index: u16,
+    start: Vec3,
+    along: Vec3,
+    left: Vec3,
+    right: Vec3,
+}
+
+/// The side of a pair seen from one of its hulls: what face queries and clipping need.
+struct View<'a> {
+    own: &'a Polyhedron<'a>,
+    other: &'a Polyhedron<'a>,
+    /// Axes and centre of the other hull's frame in the own one.
+    m: Mat3,
+    t: Vec3,
+}
+
+impl HullPair<'_> {
+    /// Contacts, in the frame of polyhedron 1.
+    pub(crate) fn collide(&self, cache: &mut PairCache, manifold: &mut Manifold) {
+        manifold.clear();
+        let m = self.pose.rotation.to_mat3();
+        let inverse = m.transpose();
+        let t = self.pose.position;
+        let view1 = View { own: &self.polyhedron1, other: &self.polyhedron2, m, t };
+        let view2 = View { own: &self.polyhedron2, other: &self.polyhedron1, m: inverse, t: -(inverse * t) };
+        if self.cached_gap(cache.words[0], &view1, &view2) > self.margin {
+            return;
+        }
+        let size = min(self.polyhedron1.inner_radius, self.polyhedron2.inner_radius);
+        let axis = self.best_axis(&view1, &view2, size);
+        cache.words[0] = axis.code;
+        if axis.gap > self.margin {
+            return;
+        }
+        let index = (axis.code & 0x3FFF_FFFF) as usize;
+        match axis.code & EDGES {
+            FACE1 => view1.face_contact(index, (self.margin, size), manifold),
+            FACE2 => {
+                view2.face_contact(index, (self.margin, size), manifold);
+                // Found in the frame of hull 2 with the roles swapped.
+                for p in manifold.points_mut() {
+                    p.point1 = m * p.point2() + t;
+                    p.normal = -(m * p.normal);
+                    p.feature ^= 0x4000_0000;
+                }
+            }
+            _ => self.edge_contact(index, &m, manifold),
+        }
+        if manifold.points().is_empty() {
+            self.passing_by(axis, &view1, &view2, manifold);
+        }
+    }
+
+    /// The gap along the axis of the last step: above the margin only if the hulls are apart along it.
+    fn cached_gap(&self, code: u32, view1: &View, view2: &View) -> Real {
+        let index = (code & 0x3FFF_FFFF) as usize;
+        match code & EDGES {
+            FACE1 if index < self.polyhedron1.planes.len() => view1.face_gap(index),
+            FACE2 if index < self.polyhedron2.planes.len() => view2.face_gap(index),
+            EDGES => {
+                let (e1, e2) = (index >> 15, index & 0x7FFF);
+                if e1 >= self.polyhedron1.edges.len() || e2 >= self.polyhedron2.edges.len() {
+                    return -Real::MAX;
+                }
+                let m = self.pose.rotation.to_mat3();
+                let edge1 = Edge::new(&self.polyhedron1, e1);
+                let edge2 = Edge::new(&self.polyhedron2, e2).placed(&m, self.pose.position);
+                edge1.gap(&edge2).map_or(-Real::MAX, |(gap, _)| gap)
+            }
+            _ => -Real::MAX,
+        }
+    }
+
+    /// The axis to build the contact on, or one along which the hulls are apart by more than the margin.
+    fn best_axis(&self, view1: &View, view2: &View, size: Real) -> Axis {
+        let (face, gap) = view1.best_face(-Real::MAX);
+        let mut best = Axis { code: FACE1 | face as u32, gap };
+        if gap > self.margin {
+            return best;
+        }
+        let (face, gap) = view2.best_face(best.gap + FACE_BIAS * size);
+        if gap > best.gap + FACE_BIAS * size {
+            best = Axis { code: FACE2 | face as u32, gap };
+        }
+        if best.gap > self.margin {
+            return best;
+        }
+        self.best_edges(view1, view2, best.gap + EDGE_BIAS * size).unwrap_or(best)
+    }
+
+    /// The edge pair with the largest gap, if that is above `floor`.
+    fn best_edges(&self, view1: &View, view2: &View, floor: Real) -> Option<Axis> {
+        let mut list1 = [0u16; 1024];
+        let mut list2 = [0u16; 1024];
+        let count1 = view1.promising_edges(floor, &mut list1);
+        let count2 = view2.promising_edges(floor, &mut list2);
+        let m = self.pose.rotation.to_mat3();
+        let mut best = Axis { code: 0, gap: floor };
+        for batch in list2[..count2].chunks(BATCH) {
+            let mut edges2 = [Edge::default(); BATCH];
+            for (edge, &index) in edges2.iter_mut().zip(batch) {
+                *edge = Edge::new(&self.polyhedron2, index as usize).placed(&m, self.pose.position);
+            }
+            for &index in &list1[..count1] {
+                let edge1 = Edge::new(&self.polyhedron1, index as usize);
+                for edge2 in &edges2[..batch.len()] {
+                    if let Some((gap, _)) = edge1.gap(edge2)
+                        && gap > best.gap
+                    {
+                        best = Axis { code: EDGES | u32::from(index) << 15 | u32::from(edge2.index), gap };
+                    }
+                }
+            }
+        }
+        (best.code != 0).then_some(best)
+    }
+
+    /// Closest points of the two edges.
+    fn edge_contact(&self, index: usize, m: &Mat3, manifold: &mut Manifold) {
+        let edge1 = Edge::new(&self.polyhedron1, index >> 15);
+        let edge2 = Edge::new(&self.polyhedron2, index & 0x7FFF).placed(m, self.pose.position);
+        let Some((separation, normal)) = edge1.gap(&edge2) else { return };
+        let (d1, d2, w) = (edge1.along, edge2.along, edge2.start - edge1.start);
+        let (a11, a12, a22) = (d1.dot(d1), d1.dot(d2), d2.dot(d2));
+        let s = (w.dot(d1) * a22 - w.dot(d2) * a12) / (a11 * a22 - a12 * a12);
+        let point1 = edge1.start + d1 * clamp(s, 0.0, 1.0);
+        manifold.push(ManifoldPoint { point1, normal, separation, feature: 0x8000_0000 | index as u32 });
+    }
+
+    /// Hulls that pass each other with no corner over the other's face: the closest points, or the deepest corner.
+    #[cold]
+    fn passing_by(&self, axis: Axis, view1: &View, view2: &View, manifold: &mut Manifold) {
+        let feature = 0x2000_0000;
+        if let Some(c) = closest(&self.supports[0], &self.supports[1], &self.pose) {
+            if c.distance <= self.margin {
+                manifold.push(ManifoldPoint { point1: c.point1, normal: c.normal, separation: c.distance, feature });
+            }
+            return;
+        }
+        let index = (axis.code & 0x3FFF_FFFF) as usize;
+        if axis.code & EDGES == FACE1 {
+            let normal = self.polyhedron1.planes[index].normal;
+            let point1 = view1.lowest_corner(normal) - normal * axis.gap;
+            manifold.push(ManifoldPoint { point1, normal, separation: axis.gap, feature });
+        } else {
+            let normal2 = self.polyhedron2.planes[index].normal;
+            let point1 = self.pose.transform_point(view2.lowest_corner(normal2));
+            let normal = -self.pose.rotation.rotate(normal2);
+            manifold.push(ManifoldPoint { point1, normal, separation: axis.gap, feature });
+        }
+    }
+}
+
+impl Edge {
+    #[inline(always)]
+    fn new(polyhedron: &Polyhedron, index: usize) -> Self {
+        let (start, end) = polyhedron.edge_points(index);
+        let normal = |e: HalfEdge| polyhedron.planes[e.face as usize].normal;
+        Self {
+            index: index as u16,
+            start,
+            along: end - start,
+            left: normal(polyhedron.edges[index]),
+            right: normal(polyhedron.edges[index ^ 1]),
+        }
+    }
+
+    fn placed(&self, m: &Mat3, t: Vec3) -> Self {
+        Self {
+            index: self.index,
+            start: *m * self.start + t,
+            along: *m * self.along,
+            left: *m * self.left,
+            right: *m * self.right,
+        }
+    }
+
+    /// Gap and normal of a pair of edges whose arcs cross; `self` is of hull 1.
+    #[inline(always)]
+    fn gap(&self, other: &Self) -> Option<(Real, Vec3)> {
+        let (c, d) = (other.left.dot(self.along), other.right.dot(self.along));
+        let (a, b) = (self.left.dot(other.along), self.right.dot(other.along));
+        // One branch, as the three tests are hard to foretell each by itself.
+        if !((c * d < 0.0) & (a * b < 0.0) & (c * b < 0.0)) {
+            return None;
+        }
+        let cross = self.along.cross(other.along);
+        let squared = cross.length_squared();
+        if squared <= PARALLEL * self.along.length_squared() * other.along.length_squared() {
+            return None;
+        }
+        let normal = normalize_or(cross, self.left);
+        let normal = if normal.dot(self.left + self.right) < 0.0 { -normal } else { normal };
+        Some((normal.dot(other.start - self.start), normal))
+    }
+}
+
+impl View<'_> {
+    /// Height of the other hull over the plane of a face.
+    fn face_gap(&self, face: usize) -> Real {
+        let plane = self.own.planes[face];
+        let n = plane.normal;
+        let local = Vec3::new(self.m.x_axis.dot(n), self.m.y_axis.dot(n), self.m.z_axis.dot(n));
+        lowest(self.other.vertices, local) + n.dot(self.t) - plane.offset
+    }
+
+    /// The first face with the largest gap; faces that cannot reach `floor` are not looked at.
+    fn best_face(&self, floor: Real) -> (usize, Real) {
+        let center = self.m * self.other.center + self.t;
+        let bound = |face: usize| {
+            let plane = self.own.planes[face];
+            plane.normal.dot(center) - plane.offset
+        };
+        // The face that the other centre is highest above is most often the one: its gap prunes the others.
+        let mut first = 0;
+        let mut highest = bound(0);
+        for face in 1..self.own.planes.len() {
+            let b = bound(face);
+            if b > highest {
+                (first, highest) = (face, b);
+            }
+        }
+        let radius = self.other.inner_radius * (1.0 - 1e-4);
+        if highest - radius < floor {
+            return (first, -Real::MAX);
+        }
+        let (mut best, mut gap) = (first, self.face_gap(first));
+        for face in 0..self.own.planes.len() {
+            if face == first || bound(face) - radius < max(gap, floor) {
+                continue;
+            }
+            let g = self.face_gap(face);
+            if g > gap || (g == gap && face < best) {
+                (best, gap) = (face, g);
+            }
+        }
+        (best, gap)
+    }
+
+    /// Lists the edges (one half of each) that can have a gap above `floor`.
+    fn promising_edges(&self, floor: Real, list: &mut [u16; 1024]) -> usize {
+        let center = self.m * self.other.center + self.t;
+        let limit = floor + self.other.inner_radius * (1.0 - 1e-4);
+        let mut count = 0;
+        for index in (0..self.own.edges.len()).step_by(2) {
+            let [left, right] = [index, index ^ 1].map(|e| self.own.planes[self.own.edges[e].face as usize].normal);
+            let w = center - self.own.vertices[self.own.edges[index].origin as usize];
+            let highest = max(left.dot(w), right.dot(w));
+            // `highest / cos(half the arc) < limit`, with `cos² = (1 + left · right) / 2`, both sides positive.
+            let cosine_squared = 0.5 * (1.0 + left.dot(right));
+            let skip = if highest <= 0.0 {
+                highest < limit
+            } else {
+                limit > 0.0 && highest * highest < limit * limit * cosine_squared
+            };
+            if !skip && count < list.len() {
+                list[count] = index as u16;
+                count += 1;
+            }
+        }
+        count
+    }
+
+    /// The first corner of the other hull that lies lowest along `normal`, in the own frame.
+    fn lowest_corner(&self, normal: Vec3) -> Vec3 {
+        let mut best = self.m * self.other.vertices[0] + self.t;
+        for &vertex in &self.other.vertices[1..] {
+            let p = self.m * vertex + self.t;
+            if p.dot(normal) < best.dot(normal) {
+                best = p;
+            }
+        }
+        best
+    }
+
+    /// Clips the incident face against the reference face; the manifold is in the own frame.
+    fn face_contact(&self, face: usize, reach: (Real, Real), manifold: &mut Manifold) {
+        let incident = self.incident_face(self.own.planes[face].normal);
+        let corners = self.own.face_loop(face).count() + self.other.face_loop(incident).count();
+        // Each plane adds at most one corner. Large faces are rare: only they pay for clearing large buffers.
+        if corners <= 24 {
+            self.clip_faces::<24>(face, incident, reach, manifold);
+        } else {
+            self.clip_faces::<512>(face, incident, reach, manifold);
+        }
+    }
+
+    /// The face of the other hull that looks most against `normal`.
+    fn incident_face(&self, normal: Vec3) -> usize {
+        let n = Vec3::new(self.m.x_axis.dot(normal), self.m.y_axis.dot(normal), self.m.z_axis.dot(normal));
+        let mut best = 0;
+        let mut cosine = self.other.planes[0].normal.dot(n);
+        for (face, plane) in self.other.planes.iter().enumerate().skip(1) {
+            let c = plane.normal.dot(n);
+            // Clearly more, so that of two faces at the same angle the first one stays.
+            if c < cosine - 1e-3 {
+                (best, cosine) = (face, c);
+            }
+        }
+        best
+    }
+
+    fn clip_faces<const N: usize>(
+        &self,
+        face: usize,
+        incident: usize,
+        (margin, size): (Real, Real),
+        manifold: &mut Manifold,
+    ) {
+        let plane = self.own.planes[face];
+        let (mut front, mut back) = ([ClipPoint::default(); N], [ClipPoint::default(); N]);
+        let mut count = 0;
+        for edge in self.other.face_loop(incident) {
+            let position = self.m * self.other.vertices[self.other.edges[edge].origin as usize] + self.t;
+            let separation = plane.normal.dot(position) - plane.offset;
+            front[count] = ClipPoint { position, separation, feature: (edge as u32 + 1) << 12 };
+            count += 1;
+        }
+        for (cut, edge) in self.own.face_loop(face).enumerate() {
+            let (out, offset) = self.own.side_plane(edge, plane.normal);
+            count = clip_polygon(&front[..count], (out, offset + GROWTH * size), cut as u32, &mut back);
+            std::mem::swap(&mut front, &mut back);
+        }
+        let mut kept = 0;
+        for k in 0..count {
+            if front[k].separation <= margin {
+                front[kept] = front[k];
+                kept += 1;
+            }
+        }
+        let faces = ((face as u32 + 1).wrapping_mul(0x85EB_CA6B) ^ (incident as u32 + 1).wrapping_mul(0xC2B2_AE35))
+            & 0x1FFF_F000;
+        let (chosen, count) = reduce(&front[..kept], plane.normal, size);
+        for &k in &chosen[..count] {
+            let p = front[k];
+            manifold.push(ManifoldPoint {
+                point1: p.position - plane.normal * p.separation,
+                normal: plane.normal,
+                separation: p.separation,
+                feature: p.feature ^ faces,
+            });
+        }
+    }
+}
+
+/// The lowest value of `direction · v` over the corners.
+fn lowest(vertices: &[Vec3], direction: Vec3) -> Real {
+    // Four running minima, as one would wait for itself at each corner.
+    let mut running = [Real::MAX; 4];
+    let chunks = vertices.chunks_exact(4);
+    for (k, &v) in chunks.remainder().iter().enumerate() {
+        running[k] = direction.dot(v);
+    }
+    for chunk in chunks {
+        for k in 0..4 {
+            running[k] = min(direction.dot(chunk[k]), running[k]);
+        }
+    }
+    min(min(running[0], running[1]), min(running[2], running[3]))
+}
