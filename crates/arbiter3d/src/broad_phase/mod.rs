@@ -190,9 +190,7 @@ impl BroadPhase {
         scratch: &mut PairScratch,
         out: &mut Vec<(u32, u32)>,
     ) {
-        scratch.stack.clear();
-        scratch.stack.push(part.links);
-        self.search(part.between).run(&mut scratch.stack, |a, b| {
+        self.search(part.between).run(part.links, &mut scratch.stack, |a, b| {
             let pair = if a < b { (a, b) } else { (b, a) };
             if filter(pair.0, pair.1) {
                 out.push(pair);

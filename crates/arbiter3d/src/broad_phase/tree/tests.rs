@@ -169,10 +169,10 @@ fn pair_search_agrees_with_brute_force() {
             let search =
                 if within { PairSearch::within(&first.tree) } else { PairSearch::between(&first.tree, &second.tree) };
             for parts in [1, 7, 100_000] {
-                let (mut work, mut found) = (Vec::new(), Vec::new());
+                let (mut work, mut found, mut stack) = (Vec::new(), Vec::new(), Vec::new());
                 search.split(parts, &mut work);
                 for part in work {
-                    search.run(&mut vec![part], |a, b| {
+                    search.run(part, &mut stack, |a, b| {
                         found.push(if within && a > b { (b, a) } else { (a, b) });
                     });
                 }
