@@ -94,7 +94,7 @@ impl<'a> PairSearch<'a> {
 
     /// The pairs of children that overlap and hold a mark: an array and how many of it count.
     ///
-    /// Which pairs overlap cannot be predicted, so each is written in any case and the count decides: half the time of
+    /// Which pairs overlap cannot be predicted, so each is written in any case and the count decides: three quarters of the time of
     /// a version with branches.
     #[inline(always)]
     fn expand(&self, LinkPair(a, b): LinkPair, out: &mut [LinkPair; MOST]) -> usize {

@@ -1,7 +1,7 @@
 //! Building inner nodes from the top down over given subtrees.
 //!
 //! A range of subtrees is split along the longest axis of their centres' box, in one of three ways:
-//! - *Middle*, for [`DynamicTree::rebuild_marked`] in the course of motion: at the middle of the centres. One cheap pass.
+//! - *Middle*, for [`DynamicTree::rebuild_loose`] in the course of motion: at the middle of the centres. One cheap pass.
 //! - *Surface*, for [`DynamicTree::rebuild`] after many insertions: at the best of seven planes by the surface area
 //!   heuristic. Twice the time; 3 % better than the middle for equal boxes, 10–20 % where sizes differ.
 //!   Source: Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", 2007.
@@ -9,7 +9,7 @@
 //!
 //! Ranges that a plane does not split (equal centres) are cut in half.
 
-use super::{DynamicTree, Link, MAX_HEIGHT, Slot};
+use super::{DynamicTree, LOOSE, Link, MAX_HEIGHT, Slot};
 use crate::math::{Aabb, Real, Vec3, max3, min3};
 
 /// Intervals of the longest axis whose borders a [`Split::Surface`] tries.
@@ -52,15 +52,17 @@ enum Split {
 }
 
 impl DynamicTree {
-    /// Builds the marked part of the tree anew: unmarked subtrees stay as they are, the nodes above them are replaced.
-    pub fn rebuild_marked(&mut self) {
-        if !self.is_empty() && self.root.is_moved() {
-            self.rebuild_where(Link::is_moved, Split::Middle);
+    /// Builds anew the part of the tree above leaves that have moved since the last rebuild; subtrees without any stay.
+    ///
+    /// This has a mark of its own: a leaf that moves every eighth step would else meet only refits and never a rebuild.
+    pub fn rebuild_loose(&mut self) {
+        if !self.is_empty() && self.root.is_loose() {
+            self.rebuild_where(Link::is_loose, Split::Middle);
             self.limit_height();
         }
     }
 
-    /// Builds the whole tree anew, with more care than [`Self::rebuild_marked`].
+    /// Builds the whole tree anew, with more care than [`Self::rebuild_loose`].
     pub fn rebuild(&mut self) {
         self.inserted = 0;
         self.rebuild_where(|_| true, Split::Surface);
@@ -76,6 +78,7 @@ impl DynamicTree {
 
     fn rebuild_where(&mut self, replace: impl Fn(Link) -> bool, split: Split) {
         if self.is_empty() || self.root.is_leaf() {
+            self.root = if self.is_empty() { Link::NONE } else { self.root.without(LOOSE) };
             return;
         }
         let mut buffers = std::mem::take(&mut self.build);
@@ -100,7 +103,7 @@ impl DynamicTree {
         while let Some(link) = buffers.stack.pop() {
             if link.is_leaf() || !replace(link) {
                 let aabb = self.box_of(link);
-                buffers.items.push(Item { center: aabb.min + aabb.max, link });
+                buffers.items.push(Item { center: aabb.min + aabb.max, link: link.without(LOOSE) });
                 continue;
             }
             buffers.nodes.push(link.index() as u32);
@@ -171,8 +174,8 @@ impl DynamicTree {
         let height = self.height_above(index);
         let node = &mut self.nodes[index];
         node.height = height;
-        let (aabb, moved, slot) = (node.aabb(), node.is_moved(), node.parent);
-        let link = Link::node(index as u32).with_moved(moved);
+        let (aabb, slot) = (node.aabb(), node.parent);
+        let link = Link::node(index as u32).with(node.flags());
         if let Some((parent, side)) = slot.split() {
             self.nodes[parent].bounds[side] = aabb;
             self.nodes[parent].children[side] = link;

@@ -70,7 +70,7 @@ impl Model {
 
     fn maintain(&mut self, random: &mut Random) {
         match random.below(6) {
-            0 => self.tree.rebuild_marked(),
+            0 => self.tree.rebuild_loose(),
             1 => self.tree.refit_marked(),
             2 => self.tree.clear_marks(),
             3 => self.tree.rebuild(),
@@ -280,7 +280,7 @@ fn rebuilds_of_hard_inputs_stay_balanced() {
         let leaf = tree.insert(Aabb::from_center(Vec3::ZERO, Vec3::ONE), i);
         tree.mark(leaf);
     }
-    tree.rebuild_marked();
+    tree.rebuild_loose();
     tree.validate().unwrap();
     assert!(tree.height() <= 15, "{}", tree.height());
     let mut tree = DynamicTree::new();
@@ -290,7 +290,7 @@ fn rebuilds_of_hard_inputs_stay_balanced() {
         tree.mark(leaf);
         scale *= 1.9;
     }
-    tree.rebuild_marked();
+    tree.rebuild_loose();
     tree.validate().unwrap();
     tree.rebuild();
     tree.validate().unwrap();
@@ -330,7 +330,7 @@ fn a_rebuild_restores_the_cost() {
     }
     tree.refit_marked();
     let spoiled = tree.cost();
-    tree.rebuild_marked();
+    tree.rebuild_loose();
     let rebuilt = tree.cost();
     assert!(spoiled > 5.0 * fresh, "{spoiled} {fresh}");
     assert!(rebuilt < 1.2 * fresh, "{rebuilt} {fresh}");
@@ -371,7 +371,7 @@ fn huge_boxes_do_no_harm() {
         tree.mark(leaf);
     }
     tree.validate().unwrap();
-    tree.rebuild_marked();
+    tree.rebuild_loose();
     tree.validate().unwrap();
     tree.rebuild();
     tree.validate().unwrap();
