@@ -1,6 +1,6 @@
 //! Arbiter: 3D rigid-body physics whose contacts live in open arbiters.
 
-#[allow(dead_code, reason = "the world is about to use it")]
+#[allow(dead_code, unused_imports, reason = "the world is about to use it")]
 mod broad_phase;
 pub mod math;
 pub mod narrow_phase;

@@ -10,21 +10,23 @@
 //! found. The result is sorted, so it does not depend on how the work was cut or who did it. Nothing is ever dropped: all
 //! buffers grow.
 //!
-//! Keeping the trees good: marked boxes are refitted each step, and every [`REBUILD_INTERVAL`]th search rebuilds what is
-//! marked instead.
+//! Keeping the trees good: marked boxes are refitted each step, every [`REBUILD_INTERVAL`]th search rebuilds what has
+//! moved since the last rebuild, and a tree that many shapes were added to is built anew.
 
 mod pair_set;
 mod tree;
 
-pub use pair_set::{PairSet, pair_key};
+pub use pair_set::PairSet;
 pub use tree::DynamicTree;
 
 use crate::math::{Aabb, Real, Vec3};
+use pair_set::pair_key;
 use tree::{LinkPair, PairSearch};
 
-/// Searches from one rebuild of the marked part of the tree to the next.
+/// Searches from one rebuild of what has moved to the next.
 ///
-/// In between, boxes are refitted, which keeps them tight but lets subtrees grow into each other.
+/// In between, boxes are refitted, which keeps them tight but lets subtrees grow into each other. Measured with 8,000
+/// boxes that all leave their fat box every step: in all, 1 costs about 30 % more than 8 and 32 about 20 % more.
 const REBUILD_INTERVAL: u32 = 8;
 
 /// Which tree a proxy lives in.
@@ -166,8 +168,10 @@ impl BroadPhase {
         self.searches = self.searches.wrapping_add(1);
         let rebuild = self.searches.is_multiple_of(REBUILD_INTERVAL);
         for tree in [&mut self.fixed, &mut self.moving] {
-            if rebuild {
-                tree.rebuild_marked();
+            if tree.wants_rebuild() {
+                tree.rebuild();
+            } else if rebuild {
+                tree.rebuild_loose();
             } else {
                 tree.refit_marked();
             }
@@ -190,9 +194,7 @@ impl BroadPhase {
         scratch: &mut PairScratch,
         out: &mut Vec<(u32, u32)>,
     ) {
-        scratch.stack.clear();
-        scratch.stack.push(part.links);
-        self.search(part.between).run(&mut scratch.stack, |a, b| {
+        self.search(part.between).run(part.links, &mut scratch.stack, |a, b| {
             let pair = if a < b { (a, b) } else { (b, a) };
             if filter(pair.0, pair.1) {
                 out.push(pair);

@@ -242,6 +242,34 @@ fn buffers_are_reused() {
     assert!(sizes[REBUILD_INTERVAL as usize * 2..].windows(2).all(|pair| pair[0] == pair[1]), "{sizes:?}");
 }
 
+/// Shapes that leave their fat box in step with the rebuilds, but never in the search that rebuilds, do not spoil the tree.
+#[test]
+fn motion_in_step_with_the_rebuilds_keeps_the_tree_good() {
+    let mut random = Random(8);
+    let mut broad = BroadPhase::new();
+    for shape in 0..1_000 {
+        broad.add(shape, TreeKind::Moving, Aabb::from_center(random.vector() * 10.0, Vec3::splat(0.3)));
+    }
+    let mut out = Vec::new();
+    broad.find_pairs(|_, _| true, &mut out);
+    let fresh = broad.tree(TreeKind::Moving).cost();
+    for step in 0..400 {
+        if step % REBUILD_INTERVAL == 3 {
+            for shape in 0..1_000 {
+                let aabb = Aabb::from_center(random.vector() * 10.0, Vec3::splat(0.3));
+                broad.update(shape, &aabb, &aabb);
+            }
+        }
+        broad.find_pairs(|_, _| true, &mut out);
+    }
+    while !broad.searches.is_multiple_of(REBUILD_INTERVAL) {
+        broad.find_pairs(|_, _| true, &mut out);
+    }
+    broad.validate().unwrap();
+    let kept = broad.tree(TreeKind::Moving).cost();
+    assert!(kept < 1.2 * fresh, "{kept} {fresh}");
+}
+
 /// Queries over both trees see a moved proxy at once, before any search; rays stop in both trees when told.
 #[test]
 fn queries_see_both_trees_and_fresh_moves() {

@@ -9,11 +9,21 @@
 //! The work is a list of [`LinkPair`]s that do not depend on each other. [`PairSearch::split`] cuts it into parts for any
 //! number of threads; the union of what they find does not depend on the cut.
 
-use super::{DynamicTree, Link};
+use super::{DynamicTree, Link, MOVED};
+
+/// A pair of subtrees splits into at most so many.
+const MOST: usize = 4;
 
 /// Two subtrees to be searched for pairs, or one to be searched against itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LinkPair(Link, Link);
+
+impl LinkPair {
+    #[inline(always)]
+    fn is_leaves(self) -> bool {
+        self.0.is_leaf() & self.1.is_leaf()
+    }
+}
 
 /// A search for pairs between two trees, or inside one.
 #[derive(Clone, Copy, Debug)]
@@ -38,85 +48,97 @@ impl<'a> PairSearch<'a> {
     /// Replaces `parts` by about `count` independent parts of the work, in a fixed order.
     pub fn split(&self, count: usize, parts: &mut Vec<LinkPair>) {
         parts.clear();
-        self.start(parts);
-        let mut next = 0;
-        while parts.len() - next > 0 && parts.len() < count {
-            let part = parts[next];
-            if part.0.is_leaf() && part.1.is_leaf() {
-                next += 1;
-                continue;
-            }
-            parts.remove(next);
-            self.expand(part, parts);
-        }
-    }
-
-    /// The whole work as one part, if there is any.
-    pub fn start(&self, parts: &mut Vec<LinkPair>) {
         let (a, b) = (self.left.root, self.right.root);
-        if a == Link::NONE || b == Link::NONE || !(a.is_moved() || b.is_moved()) {
+        if a == Link::NONE || b == Link::NONE || !any_moved(a, b) {
             return;
         }
         if self.within || self.left.box_of(a).overlaps(&self.right.box_of(b)) {
             parts.push(LinkPair(a, b));
         }
+        let mut next = 0;
+        while next < parts.len() && parts.len() < count {
+            let part = parts[next];
+            if part.is_leaves() {
+                next += 1;
+            } else {
+                parts.remove(next);
+                let mut children = [part; MOST];
+                let found = self.expand(part, &mut children);
+                parts.extend_from_slice(&children[..found]);
+            }
+        }
     }
 
-    /// Works the parts off, calling `emit` with the data of both leaves of each pair. `parts` is left empty.
-    pub fn run(&self, parts: &mut Vec<LinkPair>, mut emit: impl FnMut(u32, u32)) {
-        while let Some(part) = parts.pop() {
-            if part.0.is_leaf() && part.1.is_leaf() {
+    /// Works a part off, calling `emit` with the data of both leaves of each pair. `stack` is only memory.
+    pub fn run(&self, part: LinkPair, stack: &mut Vec<LinkPair>, mut emit: impl FnMut(u32, u32)) {
+        stack.clear();
+        stack.push(part);
+        let mut depth = 1;
+        while depth > 0 {
+            depth -= 1;
+            let part = stack[depth];
+            if part.is_leaves() {
                 if !(self.within && part.0 == part.1) {
                     emit(self.left.leaves[part.0.index()].data, self.right.leaves[part.1.index()].data);
                 }
                 continue;
             }
-            self.expand(part, parts);
+            if stack.len() < depth + MOST {
+                stack.resize(depth + MOST, part);
+            }
+            if let Some(free) = stack[depth..].first_chunk_mut() {
+                depth += self.expand(part, free);
+            }
         }
     }
 
-    /// Appends the pairs of children that overlap and hold a mark.
+    /// The pairs of children that overlap and hold a mark: an array and how many of it count.
+    ///
+    /// Which pairs overlap cannot be predicted, so each is written in any case and the count decides: three quarters
+    /// of the time of a version with branches. They go straight to where they are read again, four bytes at a time: copied in
+    /// larger pieces they cost a third more.
     #[inline(always)]
-    fn expand(&self, LinkPair(a, b): LinkPair, parts: &mut Vec<LinkPair>) {
+    fn expand(&self, LinkPair(a, b): LinkPair, out: &mut [LinkPair; MOST]) -> usize {
+        let mut found = 0;
         if self.within && a == b {
             let node = &self.left.nodes[a.index()];
             let [first, second] = node.children;
-            if (first.is_moved() || second.is_moved()) && node.bounds[0].overlaps(&node.bounds[1]) {
-                parts.push(LinkPair(first, second));
-            }
             for child in [first, second] {
-                if child.is_moved() && !child.is_leaf() {
-                    parts.push(LinkPair(child, child));
-                }
+                out[found] = LinkPair(child, child);
+                found += usize::from(child.is_moved() & !child.is_leaf());
             }
+            out[found] = LinkPair(first, second);
+            found += usize::from(any_moved(first, second) & node.bounds[0].overlaps(&node.bounds[1]));
         } else if a.is_leaf() {
             let aabb = &self.left.leaves[a.index()].aabb;
             let node = &self.right.nodes[b.index()];
-            for side in 0..2 {
-                let child = node.children[side];
-                if (a.is_moved() || child.is_moved()) && node.bounds[side].overlaps(aabb) {
-                    parts.push(LinkPair(a, child));
-                }
+            for (child, bounds) in node.children.into_iter().zip(&node.bounds) {
+                out[found] = LinkPair(a, child);
+                found += usize::from(any_moved(a, child) & bounds.overlaps(aabb));
             }
         } else if b.is_leaf() {
             let aabb = &self.right.leaves[b.index()].aabb;
             let node = &self.left.nodes[a.index()];
-            for side in 0..2 {
-                let child = node.children[side];
-                if (b.is_moved() || child.is_moved()) && node.bounds[side].overlaps(aabb) {
-                    parts.push(LinkPair(child, b));
-                }
+            for (child, bounds) in node.children.into_iter().zip(&node.bounds) {
+                out[found] = LinkPair(child, b);
+                found += usize::from(any_moved(child, b) & bounds.overlaps(aabb));
             }
         } else {
             let (left, right) = (&self.left.nodes[a.index()], &self.right.nodes[b.index()]);
-            for i in 0..2 {
-                for j in 0..2 {
-                    let (first, second) = (left.children[i], right.children[j]);
-                    if (first.is_moved() || second.is_moved()) && left.bounds[i].overlaps(&right.bounds[j]) {
-                        parts.push(LinkPair(first, second));
-                    }
+            for lane in 0..4 {
+                let (i, j) = (lane >> 1, lane & 1);
+                let (first, second) = (left.children[i], right.children[j]);
+                if any_moved(first, second) {
+                    out[found & 3] = LinkPair(first, second);
+                    found += usize::from(left.bounds[i].overlaps(&right.bounds[j]));
                 }
             }
         }
+        found
     }
+}
+
+#[inline(always)]
+fn any_moved(a: Link, b: Link) -> bool {
+    (a.0 | b.0) & MOVED != 0
 }

@@ -70,7 +70,7 @@ impl Model {
 
     fn maintain(&mut self, random: &mut Random) {
         match random.below(6) {
-            0 => self.tree.rebuild_marked(),
+            0 => self.tree.rebuild_loose(),
             1 => self.tree.refit_marked(),
             2 => self.tree.clear_marks(),
             3 => self.tree.rebuild(),
@@ -169,10 +169,10 @@ fn pair_search_agrees_with_brute_force() {
             let search =
                 if within { PairSearch::within(&first.tree) } else { PairSearch::between(&first.tree, &second.tree) };
             for parts in [1, 7, 100_000] {
-                let (mut work, mut found) = (Vec::new(), Vec::new());
+                let (mut work, mut found, mut stack) = (Vec::new(), Vec::new(), Vec::new());
                 search.split(parts, &mut work);
                 for part in work {
-                    search.run(&mut vec![part], |a, b| {
+                    search.run(part, &mut stack, |a, b| {
                         found.push(if within && a > b { (b, a) } else { (a, b) });
                     });
                 }
@@ -280,7 +280,7 @@ fn rebuilds_of_hard_inputs_stay_balanced() {
         let leaf = tree.insert(Aabb::from_center(Vec3::ZERO, Vec3::ONE), i);
         tree.mark(leaf);
     }
-    tree.rebuild_marked();
+    tree.rebuild_loose();
     tree.validate().unwrap();
     assert!(tree.height() <= 15, "{}", tree.height());
     let mut tree = DynamicTree::new();
@@ -290,8 +290,27 @@ fn rebuilds_of_hard_inputs_stay_balanced() {
         tree.mark(leaf);
         scale *= 1.9;
     }
-    tree.rebuild_marked();
+    tree.rebuild_loose();
     tree.validate().unwrap();
+    tree.rebuild();
+    tree.validate().unwrap();
+}
+
+/// Building everything anew after many insertions beats the inserted tree, most of all where sizes differ.
+#[test]
+fn a_built_tree_is_better_than_an_inserted_one() {
+    let mut random = Random(6);
+    let mut tree = DynamicTree::new();
+    for i in 0..4_000 {
+        let size = if i % 50 == 0 { 3.0 } else { 0.2 };
+        tree.insert(Aabb::from_center(random.vector() * 20.0, Vec3::splat(size)), i);
+    }
+    assert!(tree.wants_rebuild());
+    let inserted = tree.cost();
+    tree.rebuild();
+    tree.validate().unwrap();
+    assert!(tree.cost() < 0.9 * inserted, "{} {inserted}", tree.cost());
+    assert!(!tree.wants_rebuild());
 }
 
 /// Random motion spoils a tree that is only refitted; a rebuild brings the cost back to that of a fresh tree.
@@ -311,7 +330,7 @@ fn a_rebuild_restores_the_cost() {
     }
     tree.refit_marked();
     let spoiled = tree.cost();
-    tree.rebuild_marked();
+    tree.rebuild_loose();
     let rebuilt = tree.cost();
     assert!(spoiled > 5.0 * fresh, "{spoiled} {fresh}");
     assert!(rebuilt < 1.2 * fresh, "{rebuilt} {fresh}");
@@ -352,7 +371,9 @@ fn huge_boxes_do_no_harm() {
         tree.mark(leaf);
     }
     tree.validate().unwrap();
-    tree.rebuild_marked();
+    tree.rebuild_loose();
+    tree.validate().unwrap();
+    tree.rebuild();
     tree.validate().unwrap();
     let mut count = 0;
     tree.query(&Aabb::from_center(Vec3::ZERO, Vec3::splat(1e31)), |_| {
