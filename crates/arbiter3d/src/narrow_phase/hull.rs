@@ -34,6 +34,13 @@ const PARALLEL: Real = 1e-5;
 /// Edges of hull 2 that are held in the frame of hull 1 at a time.
 const BATCH: usize = 32;
 
+/// Edges that are tried at once.
+const LANES: usize = 8;
+/// A hull of 255 corners has at most 506 faces.
+const MAX_FACES: usize = 512;
+/// A hull of 255 corners has at most 759 edges.
+const MAX_EDGES: usize = 768;
+
 const FACE1: u32 = 1 << 30;
 const FACE2: u32 = 2 << 30;
 const EDGES: u32 = 3 << 30;
@@ -99,6 +106,17 @@ struct View<'a> {
     /// Axes and centre of the other hull's frame in the own one.
     m: Mat3,
     t: Vec3,
+    /// Height of the other centre over each of the own faces.
+    heights: [Real; MAX_FACES],
+}
+
+/// Batches of edges of hull 2 with a list for each number, so that an edge of hull 1 is tried against [`LANES`] of them at once.
+struct EdgeBatch {
+    indices: [u16; BATCH],
+    count: usize,
+    along: [[Real; BATCH]; 3],
+    left: [[Real; BATCH]; 3],
+    right: [[Real; BATCH]; 3],
 }
 
 impl HullPair<'_> {
@@ -108,12 +126,14 @@ impl HullPair<'_> {
         let m = self.pose.rotation.to_mat3();
         let inverse = m.transpose();
         let t = self.pose.position;
-        let view1 = View { own: &self.polyhedron1, other: &self.polyhedron2, m, t };
-        let view2 = View { own: &self.polyhedron2, other: &self.polyhedron1, m: inverse, t: -(inverse * t) };
+        let mut view1 = View::new(&self.polyhedron1, &self.polyhedron2, m, t);
+        let mut view2 = View::new(&self.polyhedron2, &self.polyhedron1, inverse, -(inverse * t));
         if self.cached_gap(cache.words[0], &view1, &view2) > self.margin {
             return;
         }
         let size = min(self.polyhedron1.inner_radius, self.polyhedron2.inner_radius);
+        view1.measure_heights();
+        view2.measure_heights();
         let axis = self.best_axis(&view1, &view2, size);
         cache.words[0] = axis.code;
         if axis.gap > self.margin {
@@ -177,26 +197,24 @@ impl HullPair<'_> {
 
     /// The edge pair with the largest gap, if that is above `floor`.
     fn best_edges(&self, view1: &View, view2: &View, floor: Real) -> Option<Axis> {
-        let mut list1 = [0u16; 1024];
-        let mut list2 = [0u16; 1024];
+        let mut list1 = [0u16; MAX_EDGES];
+        let mut list2 = [0u16; MAX_EDGES];
         let count1 = view1.promising_edges(floor, &mut list1);
         let count2 = view2.promising_edges(floor, &mut list2);
         let m = self.pose.rotation.to_mat3();
         let mut best = Axis { code: 0, gap: floor };
-        for batch in list2[..count2].chunks(BATCH) {
-            let mut edges2 = [Edge::default(); BATCH];
-            for (edge, &index) in edges2.iter_mut().zip(batch) {
-                *edge = Edge::new(&self.polyhedron2, index as usize).placed(&m, self.pose.position);
-            }
+        for indices in list2[..count2].chunks(BATCH) {
+            let batch = EdgeBatch::new(&self.polyhedron2, indices, &m);
             for &index in &list1[..count1] {
                 let edge1 = Edge::new(&self.polyhedron1, index as usize);
-                for edge2 in &edges2[..batch.len()] {
-                    if let Some((gap, _)) = edge1.gap(edge2)
+                batch.for_each_crossing(&edge1, |index2| {
+                    let edge2 = Edge::new(&self.polyhedron2, index2 as usize).placed(&m, self.pose.position);
+                    if let Some((gap, _)) = edge1.gap(&edge2)
                         && gap > best.gap
                     {
-                        best = Axis { code: EDGES | u32::from(index) << 15 | u32::from(edge2.index), gap };
+                        best = Axis { code: EDGES | u32::from(index) << 15 | u32::from(index2), gap };
                     }
-                }
+                });
             }
         }
         (best.code != 0).then_some(best)
@@ -282,7 +300,63 @@ impl Edge {
     }
 }
 
-impl View<'_> {
+impl EdgeBatch {
+    fn new(polyhedron: &Polyhedron, indices: &[u16], m: &Mat3) -> Self {
+        let mut batch = Self {
+            indices: [0; BATCH],
+            count: indices.len(),
+            along: [[0.0; BATCH]; 3],
+            left: [[0.0; BATCH]; 3],
+            right: [[0.0; BATCH]; 3],
+        };
+        for (k, &index) in indices.iter().enumerate() {
+            let edge = Edge::new(polyhedron, index as usize);
+            batch.indices[k] = index;
+            let placed = [*m * edge.along, *m * edge.left, *m * edge.right];
+            for x in 0..3 {
+                batch.along[x][k] = placed[0][x];
+                batch.left[x][k] = placed[1][x];
+                batch.right[x][k] = placed[2][x];
+            }
+        }
+        batch
+    }
+
+    /// Calls back with each edge whose arc crosses that of `edge`.
+    #[inline(always)]
+    fn for_each_crossing(&self, edge: &Edge, mut found: impl FnMut(u16)) {
+        let [e, a, b] = [edge.along, edge.left, edge.right].map(|v| v.to_array());
+        for first in (0..self.count).step_by(LANES) {
+            // Lanes past the last edge hold zeros, which never cross.
+            let mut sign = [0.0; LANES];
+            for (k, sign) in sign.iter_mut().enumerate() {
+                let k = first + k;
+                let dot = |u: &[Real; 3], v: &[[Real; BATCH]; 3]| u[0] * v[0][k] + u[1] * v[1][k] + u[2] * v[2][k];
+                let (c, d) = (dot(&e, &self.left), dot(&e, &self.right));
+                let (a, b) = (dot(&a, &self.along), dot(&b, &self.along));
+                *sign = max(max(c * d, a * b), c * b);
+            }
+            for (k, &sign) in sign.iter().enumerate() {
+                if sign < 0.0 {
+                    found(self.indices[first + k]);
+                }
+            }
+        }
+    }
+}
+
+impl<'a> View<'a> {
+    fn new(own: &'a Polyhedron<'a>, other: &'a Polyhedron<'a>, m: Mat3, t: Vec3) -> Self {
+        Self { own, other, m, t, heights: [0.0; MAX_FACES] }
+    }
+
+    fn measure_heights(&mut self) {
+        let center = self.m * self.other.center + self.t;
+        for (height, plane) in self.heights.iter_mut().zip(self.own.planes) {
+            *height = plane.normal.dot(center) - plane.offset;
+        }
+    }
+
     /// Height of the other hull over the plane of a face.
     fn face_gap(&self, face: usize) -> Real {
         let plane = self.own.planes[face];
@@ -293,27 +367,21 @@ impl View<'_> {
 
     /// The first face with the largest gap; faces that cannot reach `floor` are not looked at.
     fn best_face(&self, floor: Real) -> (usize, Real) {
-        let center = self.m * self.other.center + self.t;
-        let bound = |face: usize| {
-            let plane = self.own.planes[face];
-            plane.normal.dot(center) - plane.offset
-        };
+        let heights = &self.heights[..self.own.planes.len()];
         // The face that the other centre is highest above is most often the one: its gap prunes the others.
         let mut first = 0;
-        let mut highest = bound(0);
-        for face in 1..self.own.planes.len() {
-            let b = bound(face);
-            if b > highest {
-                (first, highest) = (face, b);
+        for (face, &height) in heights.iter().enumerate() {
+            if height > heights[first] {
+                first = face;
             }
         }
         let radius = self.other.inner_radius * (1.0 - 1e-4);
-        if highest - radius < floor {
+        if heights[first] - radius < floor {
             return (first, -Real::MAX);
         }
         let (mut best, mut gap) = (first, self.face_gap(first));
-        for face in 0..self.own.planes.len() {
-            if face == first || bound(face) - radius < max(gap, floor) {
+        for (face, &height) in heights.iter().enumerate() {
+            if face == first || height - radius < max(gap, floor) {
                 continue;
             }
             let g = self.face_gap(face);
@@ -325,21 +393,19 @@ impl View<'_> {
     }
 
     /// Lists the edges (one half of each) that can have a gap above `floor`.
-    fn promising_edges(&self, floor: Real, list: &mut [u16; 1024]) -> usize {
-        let center = self.m * self.other.center + self.t;
+    fn promising_edges(&self, floor: Real, list: &mut [u16; MAX_EDGES]) -> usize {
         let limit = floor + self.other.inner_radius * (1.0 - 1e-4);
         let mut count = 0;
         for index in (0..self.own.edges.len()).step_by(2) {
-            let [left, right] = [index, index ^ 1].map(|e| self.own.planes[self.own.edges[e].face as usize].normal);
-            let w = center - self.own.vertices[self.own.edges[index].origin as usize];
-            let highest = max(left.dot(w), right.dot(w));
+            // The start of the edge is on both planes, so `n · (m − v)` is the height over the plane.
+            let [left, right] = [index, index ^ 1].map(|e| self.own.edges[e].face as usize);
+            let highest = max(self.heights[left], self.heights[right]);
             // `highest / cos(half the arc) < limit`, with `cos² = (1 + left · right) / 2`, both sides positive.
-            let cosine_squared = 0.5 * (1.0 + left.dot(right));
-            let skip = if highest <= 0.0 {
-                highest < limit
-            } else {
-                limit > 0.0 && highest * highest < limit * limit * cosine_squared
-            };
+            let skip = highest < limit
+                && (highest <= 0.0 || {
+                    let [left, right] = [left, right].map(|face| self.own.planes[face].normal);
+                    highest * highest < limit * limit * (0.5 * (1.0 + left.dot(right)))
+                });
             if !skip && count < list.len() {
                 list[count] = index as u16;
                 count += 1;
