@@ -54,10 +54,12 @@ pub(crate) fn clip_polygon(input: &[ClipPoint], plane: (Vec3, Real), cut: u32, o
 /// Chooses at most four of the points (on a plane with `normal`): their indices and how many.
 ///
 /// `size` is a length of the shapes: points less deep than the deepest by under a ten thousandth of it count as deepest.
+#[inline(always)]
 pub(crate) fn reduce(points: &[ClipPoint], normal: Vec3, size: Real) -> ([usize; 4], usize) {
-    if points.len() <= 4 {
-        return ([0, 1, 2, 3], points.len());
-    }
+    if points.len() <= 4 { ([0, 1, 2, 3], points.len()) } else { choose_four(points, normal, size) }
+}
+
+fn choose_four(points: &[ClipPoint], normal: Vec3, size: Real) -> ([usize; 4], usize) {
     let a = deepest(points, 1e-4 * size);
     let pa = points[a].position;
     let b = best(points, |p| (p - pa).length_squared());

@@ -33,6 +33,9 @@ const GROWTH: Real = 1e-4;
 /// Edges with `sin² ` of their angle below this are parallel: the face axes stand in for their cross product.
 const PARALLEL: Real = 1e-5;
 
+/// The corners of a face, in turn, as multiples of its two half sides.
+const SIGNS: [(Real, Real); 4] = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)];
+
 /// Two boxes, told in the frame of the first.
 struct Boxes {
     /// Half extents of box 1.
@@ -225,33 +228,22 @@ impl Boxes {
 
     /// Clips the incident face against the reference face.
     #[inline(always)]
-    fn face_contact(&self, axis: usize, m: &Mat3, (margin, size): (Real, Real), manifold: &mut Manifold) {
-        let t = Vec3::from_array(self.t);
-        let mut points = [ClipPoint::default(); 12];
+    fn face_contact(&self, axis: usize, m: &Mat3, reach: (Real, Real), manifold: &mut Manifold) {
         if axis < 3 {
-            let face = FacePair::new(&self.a, &self.b, &self.c, &self.t, axis);
-            let count = face.clip(margin, &mut points);
-            let normal = face.normal();
-            let (chosen, count) = reduce(&points[..count], normal, size);
-            for &k in &chosen[..count] {
-                let p = &points[k];
-                let point1 = p.position - normal * p.separation;
-                manifold.push(ManifoldPoint { point1, normal, separation: p.separation, feature: p.feature });
-            }
-        } else {
-            let c = &self.c;
-            let transposed = [[c[0][0], c[1][0], c[2][0]], [c[0][1], c[1][1], c[2][1]], [c[0][2], c[1][2], c[2][2]]];
-            let back = |j: usize| -(c[0][j] * self.t[0] + c[1][j] * self.t[1] + c[2][j] * self.t[2]);
-            let face = FacePair::new(&self.b, &self.a, &transposed, &[back(0), back(1), back(2)], axis - 3);
-            let count = face.clip(margin, &mut points);
-            let normal2 = face.normal();
-            let normal = -(*m * normal2);
-            let (chosen, count) = reduce(&points[..count], normal2, size);
-            for &k in &chosen[..count] {
-                let p = &points[k];
-                let feature = p.feature | 0x1000;
-                manifold.push(ManifoldPoint { point1: *m * p.position + t, normal, separation: p.separation, feature });
-            }
+            FacePair::new(&self.a, &self.b, &self.c, &self.t, axis).contact(reach, manifold);
+            return;
+        }
+        let (c, t) = (&self.c, Vec3::from_array(self.t));
+        let transposed = [[c[0][0], c[1][0], c[2][0]], [c[0][1], c[1][1], c[2][1]], [c[0][2], c[1][2], c[2][2]]];
+        let back = |j: usize| -(c[0][j] * self.t[0] + c[1][j] * self.t[1] + c[2][j] * self.t[2]);
+        let face = FacePair::new(&self.b, &self.a, &transposed, &[back(0), back(1), back(2)], axis - 3);
+        face.contact(reach, manifold);
+        // Found in the frame of box 2 with the roles swapped.
+        let normal = -(*m * face.normal());
+        for p in manifold.points_mut() {
+            p.point1 = *m * p.point2() + t;
+            p.normal = normal;
+            p.feature |= 0x1000;
         }
     }
 
@@ -339,65 +331,85 @@ impl FacePair {
         normal
     }
 
-    /// Rectangle coordinates and height to the frame of the reference box.
+    /// A point of the reference face, from the coordinates in its rectangle.
     #[inline(always)]
-    fn place(&self, x: Real, y: Real, height: Real) -> Vec3 {
+    fn place(&self, x: Real, y: Real) -> Vec3 {
         let mut point = [0.0; 3];
         point[(self.k + 1) % 3] = x;
         point[(self.k + 2) % 3] = y;
-        point[self.k] = self.sign * (self.offset + height);
+        point[self.k] = self.sign * self.offset;
         Vec3::from_array(point)
     }
 
-    /// The corners of the incident face seen through the reference rectangle that are not further than `margin`.
+    /// Up to four points, in the frame of the reference box.
+    #[inline(always)]
+    fn contact(&self, (margin, size): (Real, Real), manifold: &mut Manifold) {
+        let mut points = [ClipPoint::default(); 12];
+        let count = self.clip(margin, &mut points);
+        let normal = self.normal();
+        let (chosen, count) = reduce(&points[..count], Vec3::Z, size);
+        for &k in &chosen[..count] {
+            let p = &points[k];
+            let point1 = self.place(p.position.x, p.position.y);
+            manifold.push(ManifoldPoint { point1, normal, separation: p.separation, feature: p.feature });
+        }
+    }
+
+    /// The corners of the incident face seen through the reference rectangle that are not further than `margin`; positions
+    /// hold the coordinates in the rectangle.
+    ///
+    /// There are at most eight, but rounding might find one twice: hence room for all twelve candidates, which are all written,
+    /// each over the last one if that did not count.
     #[inline(always)]
     fn clip(&self, margin: Real, points: &mut [ClipPoint; 12]) -> usize {
         let (m, p, q, r) = (&self.center, &self.p, &self.q, &self.rectangle);
-        // Corner e of the incident face, and the way to corner e + 1.
-        const SIDES: [(Real, Real); 4] = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)];
-        let corner: [[Real; 4]; 3] = std::array::from_fn(|x| SIDES.map(|(a, b)| m[x] + a * p[x] + b * q[x]));
-        let way: [[Real; 4]; 3] = std::array::from_fn(|x| [-2.0 * p[x], -2.0 * q[x], 2.0 * p[x], 2.0 * q[x]]);
+        let (corner, way) = self.sides();
         let (mut enter, mut leave) = ([0.0; 4], [1.0; 4]);
         for x in 0..2 {
             for e in 0..4 {
-                // A side along the border divides by zero: infinities keep or drop it, and `0 / 0` (on the border) is ignored
-                // by the order of the arguments of `min` and `max`.
-                let inverse = 1.0 / way[x][e];
+                // A side along the border may not divide by zero: a tiny slope keeps it inside or throws it far out.
+                let inverse = 1.0 / if way[x][e] == 0.0 { 1e-30 } else { way[x][e] };
                 let (low, high) = ((-r[x] - corner[x][e]) * inverse, (r[x] - corner[x][e]) * inverse);
-                let (first, second) = if low < high { (low, high) } else { (high, low) };
-                enter[e] = max(first, enter[e]);
-                leave[e] = min(second, leave[e]);
+                enter[e] = max(min(low, high), enter[e]);
+                leave[e] = min(max(high, low), leave[e]);
             }
         }
         let mut count = 0;
-        let mut push = |x: Real, y: Real, height: Real, feature: u32| {
-            if height <= margin && count < 12 {
-                let feature = self.feature | feature;
-                points[count] = ClipPoint { position: self.place(x, y, height), separation: height, feature };
-                count += 1;
-            }
+        let mut push = |x: Real, y: Real, height: Real, feature: u32, valid: bool| {
+            let feature = self.feature | feature;
+            points[count] = ClipPoint { position: Vec3::new(x, y, 0.0), separation: height, feature };
+            count += (valid & (height <= margin)) as usize;
         };
         for e in 0..4 {
-            if enter[e] <= leave[e] {
-                let at = |t: Real| [0, 1, 2].map(|x: usize| corner[x][e] + way[x][e] * t);
-                let [x, y, z] = at(enter[e]);
-                push(x, y, z, (e as u32) << 2 | (enter[e] > 0.0) as u32);
-                if leave[e] < 1.0 && enter[e] < leave[e] {
-                    let [x, y, z] = at(leave[e]);
-                    push(x, y, z, (e as u32) << 2 | 2);
-                }
-            }
+            let (t, u) = (enter[e], leave[e]);
+            let at = |x: usize, t: Real| corner[x][e] + way[x][e] * t;
+            push(at(0, t), at(1, t), at(2, t), (e as u32) << 2 | (t > 0.0) as u32, t <= u);
+            push(at(0, u), at(1, u), at(2, u), (e as u32) << 2 | 2, (t < u) & (u < 1.0));
         }
         // Corners of the rectangle over the incident face: solve `s p + t q = corner − m` by Cramer's rule.
         let area = p[0] * q[1] - p[1] * q[0];
-        for (e, (a, b)) in SIDES.into_iter().enumerate() {
+        let (s_slope, t_slope) = (p[2] / area, q[2] / area);
+        for (e, (a, b)) in SIGNS.into_iter().enumerate() {
             let (x, y) = (a * r[0] - m[0], b * r[1] - m[1]);
             let (s, t) = (x * q[1] - y * q[0], p[0] * y - p[1] * x);
-            if s.abs() < area.abs() && t.abs() < area.abs() {
-                let height = m[2] + (s * p[2] + t * q[2]) / area;
-                push(a * r[0], b * r[1], height, 16 | (e as u32) << 2);
-            }
+            let height = m[2] + (s * s_slope + t * t_slope);
+            let over = (s.abs() < area.abs()) & (t.abs() < area.abs());
+            push(a * r[0], b * r[1], height, 16 | (e as u32) << 2, over);
         }
         count
+    }
+
+    /// The corners of the incident face, and from each the way to the next: two coordinates in the rectangle, then the height.
+    #[inline(always)]
+    fn sides(&self) -> ([[Real; 4]; 3], [[Real; 4]; 3]) {
+        let (mut corner, mut way) = ([[0.0; 4]; 3], [[0.0; 4]; 3]);
+        for x in 0..3 {
+            let (m, p, q) = (self.center[x], self.p[x], self.q[x]);
+            for e in 0..4 {
+                corner[x][e] = m + SIGNS[e].0 * p + SIGNS[e].1 * q;
+            }
+            way[x] = [-2.0 * p, -2.0 * q, 2.0 * p, 2.0 * q];
+        }
+        (corner, way)
     }
 }

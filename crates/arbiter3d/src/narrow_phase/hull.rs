@@ -110,13 +110,13 @@ struct View<'a> {
     heights: [Real; MAX_FACES],
 }
 
-/// Batches of edges of hull 2 with a list for each number, so that an edge of hull 1 is tried against [`LANES`] of them at once.
-struct EdgeBatch {
-    indices: [u16; BATCH],
-    count: usize,
-    along: [[Real; BATCH]; 3],
-    left: [[Real; BATCH]; 3],
-    right: [[Real; BATCH]; 3],
+/// [`LANES`] edges of hull 2, turned into the frame of hull 1: an edge of hull 1 is tried against all of them at once.
+#[derive(Clone, Copy, Default)]
+struct EdgeGroup {
+    indices: [u16; LANES],
+    along: [[Real; LANES]; 3],
+    left: [[Real; LANES]; 3],
+    right: [[Real; LANES]; 3],
 }
 
 impl HullPair<'_> {
@@ -204,17 +204,22 @@ impl HullPair<'_> {
         let m = self.pose.rotation.to_mat3();
         let mut best = Axis { code: 0, gap: floor };
         for indices in list2[..count2].chunks(BATCH) {
-            let batch = EdgeBatch::new(&self.polyhedron2, indices, &m);
+            let mut groups = [EdgeGroup::default(); BATCH / LANES];
+            for (group, indices) in groups.iter_mut().zip(indices.chunks(LANES)) {
+                group.fill(&self.polyhedron2, indices, &m);
+            }
             for &index in &list1[..count1] {
                 let edge1 = Edge::new(&self.polyhedron1, index as usize);
-                batch.for_each_crossing(&edge1, |index2| {
-                    let edge2 = Edge::new(&self.polyhedron2, index2 as usize).placed(&m, self.pose.position);
-                    if let Some((gap, _)) = edge1.gap(&edge2)
-                        && gap > best.gap
-                    {
-                        best = Axis { code: EDGES | u32::from(index) << 15 | u32::from(index2), gap };
-                    }
-                });
+                for group in &groups[..indices.len().div_ceil(LANES)] {
+                    group.for_each_crossing(&edge1, |index2| {
+                        let edge2 = Edge::new(&self.polyhedron2, index2 as usize).placed(&m, self.pose.position);
+                        if let Some((gap, _)) = edge1.gap(&edge2)
+                            && gap > best.gap
+                        {
+                            best = Axis { code: EDGES | u32::from(index) << 15 | u32::from(index2), gap };
+                        }
+                    });
+                }
             }
         }
         (best.code != 0).then_some(best)
@@ -300,49 +305,46 @@ impl Edge {
     }
 }
 
-impl EdgeBatch {
-    fn new(polyhedron: &Polyhedron, indices: &[u16], m: &Mat3) -> Self {
-        let mut batch = Self {
-            indices: [0; BATCH],
-            count: indices.len(),
-            along: [[0.0; BATCH]; 3],
-            left: [[0.0; BATCH]; 3],
-            right: [[0.0; BATCH]; 3],
-        };
+impl EdgeGroup {
+    /// Lanes past the last edge keep their zeros, which never cross.
+    fn fill(&mut self, polyhedron: &Polyhedron, indices: &[u16], m: &Mat3) {
         for (k, &index) in indices.iter().enumerate() {
             let edge = Edge::new(polyhedron, index as usize);
-            batch.indices[k] = index;
+            self.indices[k] = index;
             let placed = [*m * edge.along, *m * edge.left, *m * edge.right];
             for x in 0..3 {
-                batch.along[x][k] = placed[0][x];
-                batch.left[x][k] = placed[1][x];
-                batch.right[x][k] = placed[2][x];
+                self.along[x][k] = placed[0][x];
+                self.left[x][k] = placed[1][x];
+                self.right[x][k] = placed[2][x];
             }
         }
-        batch
     }
 
     /// Calls back with each edge whose arc crosses that of `edge`.
     #[inline(always)]
     fn for_each_crossing(&self, edge: &Edge, mut found: impl FnMut(u16)) {
-        let [e, a, b] = [edge.along, edge.left, edge.right].map(|v| v.to_array());
-        for first in (0..self.count).step_by(LANES) {
-            // Lanes past the last edge hold zeros, which never cross.
-            let mut sign = [0.0; LANES];
-            for (k, sign) in sign.iter_mut().enumerate() {
-                let k = first + k;
-                let dot = |u: &[Real; 3], v: &[[Real; BATCH]; 3]| u[0] * v[0][k] + u[1] * v[1][k] + u[2] * v[2][k];
-                let (c, d) = (dot(&e, &self.left), dot(&e, &self.right));
-                let (a, b) = (dot(&a, &self.along), dot(&b, &self.along));
-                *sign = max(max(c * d, a * b), c * b);
-            }
-            for (k, &sign) in sign.iter().enumerate() {
-                if sign < 0.0 {
-                    found(self.indices[first + k]);
-                }
+        let (c, d) = (dots(edge.along, &self.left), dots(edge.along, &self.right));
+        let (a, b) = (dots(edge.left, &self.along), dots(edge.right, &self.along));
+        let mut sign = [0.0; LANES];
+        for k in 0..LANES {
+            sign[k] = max(max(c[k] * d[k], a[k] * b[k]), c[k] * b[k]);
+        }
+        for (k, &sign) in sign.iter().enumerate() {
+            if sign < 0.0 {
+                found(self.indices[k]);
             }
         }
     }
+}
+
+/// `u · v` for each lane.
+#[inline(always)]
+fn dots(u: Vec3, v: &[[Real; LANES]; 3]) -> [Real; LANES] {
+    let mut sum = [0.0; LANES];
+    for k in 0..LANES {
+        sum[k] = u.x * v[0][k] + u.y * v[1][k] + u.z * v[2][k];
+    }
+    sum
 }
 
 impl<'a> View<'a> {
