@@ -5,7 +5,7 @@
 //! triangle and the one that adds most area to it. Equal candidates go to the lowest index, and a candidate must win by a
 //! relative [`TIE`], so that rounding does not make a resting contact jump from one equal choice to the next.
 
-use crate::math::{Real, Vec3};
+use crate::math::{Real, Vec3, max, min};
 
 /// A candidate must beat the best so far by this share: the eight points of two crossed boxes stay where they are.
 const TIE: Real = 1e-3;
@@ -71,10 +71,8 @@ fn choose_four(points: &[ClipPoint], normal: Vec3, size: Real) -> ([usize; 4], u
     let (pb, pc) = (points[b].position, points[c].position);
     let sides = [(pa, (pb - pa).cross(normal)), (pb, (pc - pb).cross(normal)), (pc, (pa - pc).cross(normal))];
     let gain = |p: Vec3| {
-        sides.iter().fold(0.0, |g, (origin, out)| {
-            let area = (p - *origin).dot(*out);
-            if area > g { area } else { g }
-        })
+        let [x, y, z] = sides.map(|(origin, out)| (p - origin).dot(out));
+        max(max(x, y), max(z, 0.0))
     };
     let d = best(points, gain);
     // Points that coincide give no length or area, and are found twice: drop them.
@@ -90,18 +88,19 @@ fn choose_four(points: &[ClipPoint], normal: Vec3, size: Real) -> ([usize; 4], u
 
 /// The first point that is within `tolerance` of the deepest.
 fn deepest(points: &[ClipPoint], tolerance: Real) -> usize {
-    let lowest = points.iter().fold(Real::MAX, |m, p| if p.separation < m { p.separation } else { m });
+    let lowest = points.iter().fold(Real::MAX, |m, p| min(p.separation, m));
     points.iter().position(|p| p.separation <= lowest + tolerance).unwrap_or(0)
 }
 
 /// The point with the largest score; the lowest index of those that are equal.
 fn best(points: &[ClipPoint], score: impl Fn(Vec3) -> Real) -> usize {
-    let (mut index, mut highest) = (0, score(points[0].position));
+    // Selects, not branches: which of eight equal corners is a hair farther cannot be foretold.
+    let (mut index, mut floor) = (0, score(points[0].position) * (1.0 + TIE));
     for (i, point) in points.iter().enumerate().skip(1) {
         let s = score(point.position);
-        if s > highest * (1.0 + TIE) {
-            (index, highest) = (i, s);
-        }
+        let wins = s > floor;
+        index = std::hint::select_unpredictable(wins, i, index);
+        floor = std::hint::select_unpredictable(wins, s * (1.0 + TIE), floor);
     }
     index
 }
