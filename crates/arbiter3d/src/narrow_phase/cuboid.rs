@@ -18,7 +18,7 @@
 //! rectangle that lie over the incident face are added. The rectangle is grown by [`GROWTH`] so that corners that lie on its
 //! border, as in every tidy stack, count as inside and keep their feature.
 
-use super::clip::{ClipPoint, reduce};
+use super::clip::choose_four;
 use super::distance::{Support, closest};
 use super::{Manifold, ManifoldPoint, PairCache};
 use crate::math::{Mat3, Pose, Real, Vec3, clamp, max, min};
@@ -293,6 +293,19 @@ struct FacePair {
     feature: u32,
 }
 
+/// Corners of a clipped face: coordinates in the reference rectangle and height over it.
+///
+/// There are at most eight, but rounding might find one twice: hence room for all twelve candidates, and for an index of four
+/// bits, which needs no check. Arrays a coordinate, so that what was written by ones is read by ones.
+#[derive(Default)]
+struct Patch {
+    x: [Real; 16],
+    y: [Real; 16],
+    height: [Real; 16],
+    feature: [u32; 16],
+    count: usize,
+}
+
 impl FacePair {
     /// `half1`, `half2`: half extents of the reference and the incident box; `c`, `t`: placement of the incident box.
     #[inline(always)]
@@ -331,37 +344,29 @@ impl FacePair {
         normal
     }
 
-    /// A point of the reference face, from the coordinates in its rectangle.
-    #[inline(always)]
-    fn place(&self, x: Real, y: Real) -> Vec3 {
-        let mut point = [0.0; 3];
-        point[(self.k + 1) % 3] = x;
-        point[(self.k + 2) % 3] = y;
-        point[self.k] = self.sign * self.offset;
-        Vec3::from_array(point)
-    }
-
     /// Up to four points, in the frame of the reference box.
     #[inline(always)]
     fn contact(&self, (margin, size): (Real, Real), manifold: &mut Manifold) {
-        let mut points = [ClipPoint::default(); 12];
-        let count = self.clip(margin, &mut points);
+        let mut patch = Patch::default();
+        self.clip(margin, &mut patch);
+        let (chosen, count) = if patch.count <= 4 {
+            ([0, 1, 2, 3], patch.count)
+        } else {
+            choose_four(patch.count, |i| (patch.x[i], patch.y[i]), |i| patch.height[i], size)
+        };
         let normal = self.normal();
-        let (chosen, count) = reduce(&points[..count], Vec3::Z, size);
+        let (u, v, origin) = (Vec3::AXES[(self.k + 1) % 3], Vec3::AXES[(self.k + 2) % 3], normal * self.offset);
         for &k in &chosen[..count] {
-            let p = &points[k];
-            let point1 = self.place(p.position.x, p.position.y);
-            manifold.push(ManifoldPoint { point1, normal, separation: p.separation, feature: p.feature });
+            let point1 = origin + u * patch.x[k] + v * patch.y[k];
+            manifold.push(ManifoldPoint { point1, normal, separation: patch.height[k], feature: patch.feature[k] });
         }
     }
 
-    /// The corners of the incident face seen through the reference rectangle that are not further than `margin`; positions
-    /// hold the coordinates in the rectangle.
+    /// The corners of the incident face seen through the reference rectangle that are not further than `margin`.
     ///
-    /// There are at most eight, but rounding might find one twice: hence room for all twelve candidates, which are all written,
-    /// each over the last one if that did not count.
+    /// All twelve candidates are written, each over the last one if that did not count.
     #[inline(always)]
-    fn clip(&self, margin: Real, points: &mut [ClipPoint; 12]) -> usize {
+    fn clip(&self, margin: Real, patch: &mut Patch) {
         let (m, p, q, r) = (&self.center, &self.p, &self.q, &self.rectangle);
         let (corner, way) = self.sides();
         let (mut enter, mut leave) = ([0.0; 4], [1.0; 4]);
@@ -374,11 +379,11 @@ impl FacePair {
                 leave[e] = min(max(high, low), leave[e]);
             }
         }
-        let mut count = 0;
         let mut push = |x: Real, y: Real, height: Real, feature: u32, valid: bool| {
-            let feature = self.feature | feature;
-            points[count] = ClipPoint { position: Vec3::new(x, y, 0.0), separation: height, feature };
-            count += (valid & (height <= margin)) as usize;
+            let i = patch.count & 15;
+            (patch.x[i], patch.y[i], patch.height[i]) = (x, y, height);
+            patch.feature[i] = self.feature | feature;
+            patch.count += (valid & (height <= margin)) as usize;
         };
         for e in 0..4 {
             let (t, u) = (enter[e], leave[e]);
@@ -396,7 +401,6 @@ impl FacePair {
             let over = (s.abs() < area.abs()) & (t.abs() < area.abs());
             push(a * r[0], b * r[1], height, 16 | (e as u32) << 2, over);
         }
-        count
     }
 
     /// The corners of the incident face, and from each the way to the next: two coordinates in the rectangle, then the height.
