@@ -311,11 +311,10 @@ impl EdgeGroup {
         for (k, &index) in indices.iter().enumerate() {
             let edge = Edge::new(polyhedron, index as usize);
             self.indices[k] = index;
-            let placed = [*m * edge.along, *m * edge.left, *m * edge.right];
-            for x in 0..3 {
-                self.along[x][k] = placed[0][x];
-                self.left[x][k] = placed[1][x];
-                self.right[x][k] = placed[2][x];
+            let lists = [&mut self.along, &mut self.left, &mut self.right];
+            for (list, v) in lists.into_iter().zip([edge.along, edge.left, edge.right]) {
+                let v = *m * v;
+                (list[0][k], list[1][k], list[2][k]) = (v.x, v.y, v.z);
             }
         }
     }
