@@ -396,23 +396,20 @@ impl<'a> View<'a> {
     /// Lists the edges (one half of each) that can have a gap above `floor`.
     fn promising_edges(&self, floor: Real, list: &mut [u16; MAX_EDGES]) -> usize {
         let limit = floor + self.other.inner_radius * (1.0 - 1e-4);
+        let planes = self.own.planes;
         let mut count = 0;
-        for index in (0..self.own.edges.len()).step_by(2) {
+        for (pair, twins) in self.own.edges.as_chunks::<2>().0.iter().enumerate() {
             // The start of the edge is on both planes, so `n · (m − v)` is the height over the plane.
-            let [left, right] = [index, index ^ 1].map(|e| self.own.edges[e].face as usize);
+            let [left, right] = twins.map(|e| e.face as usize);
             let highest = max(self.heights[left], self.heights[right]);
             // `highest / cos(half the arc) < limit`, with `cos² = (1 + left · right) / 2`, both sides positive.
-            let skip = highest < limit
-                && (highest <= 0.0 || {
-                    let [left, right] = [left, right].map(|face| self.own.planes[face].normal);
-                    highest * highest < limit * limit * (0.5 * (1.0 + left.dot(right)))
-                });
-            if !skip && count < list.len() {
-                list[count] = index as u16;
-                count += 1;
-            }
+            let cosine_squared = 0.5 * (1.0 + planes[left].normal.dot(planes[right].normal));
+            let rises = (highest > 0.0) & (highest * highest >= limit * limit * cosine_squared);
+            // Written always, counted if it may matter: whether it does is hard to foretell. There is room for all edges.
+            list[count.min(MAX_EDGES - 1)] = 2 * pair as u16;
+            count += ((highest >= limit) | rises) as usize;
         }
-        count
+        count.min(MAX_EDGES)
     }
 
     /// The first corner of the other hull that lies lowest along `normal`, in the own frame.
