@@ -9,9 +9,10 @@
 //! edges i × j       (|t · (e_i × c_j)| − reach of both) / √(1 − C_ij²)
 //! ```
 //!
-//! The largest gap tells the direction of least overlap. Faces of box 1 win over those of box 2, and faces over edges, unless the
-//! other is better by a share of the smaller box ([`FACE_BIAS`], [`EDGE_BIAS`]): a face gives up to four points, an edge pair
-//! only one, and the choice must not change from step to step in a resting stack.
+//! The largest gap tells the direction of least overlap. The choice must not change from step to step in a resting stack: faces of
+//! box 1 win over those of box 2 unless these are better by a share of the smaller box ([`FACE_BIAS`]). An edge pair whose axis is
+//! almost a face normal, as in every stack that leans by a hair, has to beat the face as clipped by [`EDGE_BIAS`], since the face
+//! gives up to four points and the edges only one. At other angles edges win at once: a face would push the wrong way.
 //!
 //! A face contact is found without walking polygons: each edge of the incident face is cut by the rectangle of the reference
 //! face (Liang, Barsky, "A new concept and method for line clipping", 1984), four edges side by side, and the corners of the
@@ -26,8 +27,12 @@ use crate::shape::Cuboid;
 
 /// A face of box 2 is the reference when it is better by this share of the smallest half extent.
 const FACE_BIAS: Real = 2e-3;
-/// An edge pair makes the contact when it is better by this share of the smallest half extent.
-const EDGE_BIAS: Real = 5e-3;
+/// An edge pair is looked at when it is better than the best face by this share of the smallest half extent.
+const EDGE_GAIN: Real = 2e-4;
+/// Along a face normal, an edge pair makes the contact when the clipped face is deeper by this share of the smallest half extent.
+pub(super) const EDGE_BIAS: Real = 5e-3;
+/// Cosine above which the axis of an edge pair is taken to be along a face normal (11°).
+pub(super) const ALIGNED: Real = 0.98;
 /// Share by which the reference rectangle is grown.
 const GROWTH: Real = 1e-4;
 /// Edges with `sin² ` of their angle below this are parallel: the face axes stand in for their cross product.
@@ -65,19 +70,37 @@ pub(crate) fn cuboid_cuboid(
         return;
     }
     let size = min(cuboid1.half_extents().min_element(), cuboid2.half_extents().min_element());
-    let best = boxes.best_axis(margin, size);
-    cache.words[0] = best.axis as u32 + 1;
-    if best.gap > margin {
+    let face = boxes.best_face(margin, size);
+    cache.words[0] = face.axis as u32 + 1;
+    if face.gap > margin {
         return;
     }
-    if best.axis >= 6 {
-        boxes.edge_contact(best.axis - 6, manifold);
-        return;
+    let edge = boxes.best_edge(face.gap + EDGE_GAIN * size);
+    if let Some(edge) = edge {
+        cache.words[0] = edge.axis as u32 + 1;
+        if edge.gap > margin {
+            return;
+        }
+        if boxes.cosine(edge.axis - 6, face.axis) < ALIGNED {
+            boxes.edge_contact(edge.axis - 6, manifold);
+            return;
+        }
     }
-    boxes.face_contact(best.axis, &m, (margin, size), manifold);
+    boxes.face_contact(face.axis, &m, (margin, size), manifold);
+    if let Some(edge) = edge
+        && !stands_in(manifold, edge.gap - EDGE_BIAS * size)
+    {
+        manifold.clear();
+        boxes.edge_contact(edge.axis - 6, manifold);
+    }
     if manifold.points().is_empty() {
-        passing_by(cuboid1, cuboid2, pose, (margin, best.gap, best.axis), manifold);
+        passing_by(cuboid1, cuboid2, pose, (margin, face.gap, face.axis), manifold);
     }
+}
+
+/// Whether a face contact is there and nowhere deeper than `depth`.
+pub(super) fn stands_in(manifold: &Manifold, depth: Real) -> bool {
+    !manifold.points().is_empty() && manifold.points().iter().all(|p| p.separation >= depth)
 }
 
 /// Boxes that pass each other with no corner over the other's face: the closest points, or the deepest corner.
@@ -175,9 +198,9 @@ impl Boxes {
         }
     }
 
-    /// The axis to build the contact on, or one along which the boxes are apart by more than `margin`.
+    /// The face to build the contact on, or one along which the boxes are apart by more than `margin`.
     #[inline(always)]
-    fn best_axis(&self, margin: Real, size: Real) -> Axis {
+    fn best_face(&self, margin: Real, size: Real) -> Axis {
         let mut best = Axis { axis: 0, gap: self.face1_gap(0) };
         for i in 1..3 {
             let gap = self.face1_gap(i);
@@ -195,20 +218,13 @@ impl Boxes {
                 other = Axis { axis: 3 + j, gap };
             }
         }
-        if other.gap > margin || other.gap > best.gap + FACE_BIAS * size {
-            best = other;
-        }
-        if best.gap > margin {
-            return best;
-        }
-        self.best_edge(best, EDGE_BIAS * size)
+        if other.gap > margin || other.gap > best.gap + FACE_BIAS * size { other } else { best }
     }
 
-    /// The best edge pair if it beats `face` by `bias`.
+    /// The edge pair with the largest gap, if that is above `floor`.
     #[inline(always)]
-    fn best_edge(&self, face: Axis, bias: Real) -> Axis {
-        let floor = face.gap + bias;
-        let mut best = Axis { axis: face.axis, gap: floor };
+    fn best_edge(&self, floor: Real) -> Option<Axis> {
+        let mut best = Axis { axis: 0, gap: floor };
         for i in 0..3 {
             for j in 0..3 {
                 let gap = self.edge_gap(i, j);
@@ -223,7 +239,19 @@ impl Boxes {
                 }
             }
         }
-        if best.axis == face.axis { face } else { best }
+        (best.axis != 0).then_some(best)
+    }
+
+    /// Cosine of the angle between the axis of an edge pair and that of a face, never negative.
+    fn cosine(&self, pair: usize, face: usize) -> Real {
+        let (i, j) = (pair / 3, pair % 3);
+        // `e_i × c_j` has no part along `e_i`, and along another axis the coordinate of `c_j` on the third; so for box 2.
+        let part = match face {
+            k @ 0..=2 if k != i => self.c[3 - i - k][j],
+            k @ 3..=5 if k - 3 != j => self.c[i][6 - j - k],
+            _ => 0.0,
+        };
+        part.abs() / self.edge_length_squared(i, j).sqrt()
     }
 
     /// Clips the incident face against the reference face.

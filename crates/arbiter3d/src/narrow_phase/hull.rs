@@ -14,9 +14,12 @@
 //! `n · (m − v)` is at most the larger of the values at its ends, over the cosine of half the arc where that is positive. What
 //! cannot beat the best gap so far is skipped; in round hulls this leaves the few features next to the contact.
 //!
+//! Faces and edges are weighed against each other as in the cuboid kernel, with the inner radius as the size of a hull.
+//!
 //! The cache holds the last axis. It only ends the search early, when the hulls are still apart along it.
 
 use super::clip::{ClipPoint, clip_polygon, reduce};
+use super::cuboid::{ALIGNED, EDGE_BIAS, stands_in};
 use super::distance::{Support, closest};
 use super::polyhedron::{CuboidFeatures, Polyhedron};
 use super::{Manifold, ManifoldPoint, PairCache};
@@ -25,8 +28,8 @@ use crate::shape::{ConvexHull, Cuboid, HalfEdge};
 
 /// A face of hull 2 is the reference when it is better by this share of the smaller inner radius.
 const FACE_BIAS: Real = 2e-3;
-/// An edge pair makes the contact when it is better by this share of the smaller inner radius.
-const EDGE_BIAS: Real = 5e-3;
+/// An edge pair is looked at when it is better than the best face by this share of the smaller inner radius.
+const EDGE_GAIN: Real = 2e-4;
 /// Share of the smaller inner radius by which side planes are moved out, so that corners on the border stay corners.
 const GROWTH: Real = 1e-4;
 /// Edges with `sin²` of their angle below this are parallel: faces stand in for them.
@@ -89,6 +92,18 @@ struct Axis {
     gap: Real,
 }
 
+impl Axis {
+    /// The face, for a face axis.
+    fn index(self) -> usize {
+        (self.code & 0x3FFF_FFFF) as usize
+    }
+
+    /// The edges of hull 1 and hull 2, for a pair of edges.
+    fn edges(self) -> (usize, usize) {
+        (self.index() >> 15, self.index() & 0x7FFF)
+    }
+}
+
 /// An edge with the normals of its faces, all in the frame of hull 1.
 #[derive(Clone, Copy, Default)]
 struct Edge {
@@ -134,65 +149,89 @@ impl HullPair<'_> {
         let size = min(self.polyhedron1.inner_radius, self.polyhedron2.inner_radius);
         view1.measure_heights();
         view2.measure_heights();
-        let axis = self.best_axis(&view1, &view2, size);
-        cache.words[0] = axis.code;
-        if axis.gap > self.margin {
+        let face = self.best_face(&view1, &view2, size);
+        cache.words[0] = face.code;
+        if face.gap > self.margin {
             return;
         }
-        let index = (axis.code & 0x3FFF_FFFF) as usize;
-        match axis.code & EDGES {
-            FACE1 => view1.face_contact(index, (self.margin, size), manifold),
-            FACE2 => {
-                view2.face_contact(index, (self.margin, size), manifold);
-                // Found in the frame of hull 2 with the roles swapped.
-                for p in manifold.points_mut() {
-                    p.point1 = m * p.point2() + t;
-                    p.normal = -(m * p.normal);
-                    p.feature ^= 0x4000_0000;
-                }
+        let edges = self.best_edges(&view1, &view2, face.gap + EDGE_GAIN * size);
+        if let Some(edges) = edges {
+            cache.words[0] = edges.code;
+            if edges.gap > self.margin {
+                return;
             }
-            _ => self.edge_contact(index, &m, manifold),
+            if !self.is_aligned(edges, face, &m) {
+                self.edge_contact(edges, &m, manifold);
+                return;
+            }
+        }
+        self.face_contact(face, (&view1, &view2), size, manifold);
+        if let Some(edges) = edges
+            && !stands_in(manifold, edges.gap - EDGE_BIAS * size)
+        {
+            manifold.clear();
+            self.edge_contact(edges, &m, manifold);
         }
         if manifold.points().is_empty() {
-            self.passing_by(axis, &view1, &view2, manifold);
+            self.passing_by(face, &view1, &view2, manifold);
         }
+    }
+
+    /// Clips the incident face of one hull against the reference face of the other.
+    fn face_contact(&self, face: Axis, (view1, view2): (&View, &View), size: Real, manifold: &mut Manifold) {
+        if face.code & EDGES == FACE1 {
+            view1.face_contact(face.index(), (self.margin, size), manifold);
+            return;
+        }
+        view2.face_contact(face.index(), (self.margin, size), manifold);
+        // Found in the frame of hull 2 with the roles swapped.
+        for p in manifold.points_mut() {
+            p.point1 = view1.m * p.point2() + view1.t;
+            p.normal = -(view1.m * p.normal);
+            p.feature ^= 0x4000_0000;
+        }
+    }
+
+    /// Whether the axis of a pair of edges is almost the normal of a face.
+    fn is_aligned(&self, edges: Axis, face: Axis, m: &Mat3) -> bool {
+        let normal = if face.code & EDGES == FACE1 {
+            self.polyhedron1.planes[face.index()].normal
+        } else {
+            -(*m * self.polyhedron2.planes[face.index()].normal)
+        };
+        self.edge_gap(edges, m).is_some_and(|(_, axis)| axis.dot(normal) > ALIGNED)
+    }
+
+    /// Gap and normal of a pair of edges that makes a face of the Minkowski difference.
+    fn edge_gap(&self, edges: Axis, m: &Mat3) -> Option<(Real, Vec3)> {
+        let (e1, e2) = edges.edges();
+        Edge::new(&self.polyhedron1, e1).gap(&Edge::new(&self.polyhedron2, e2).placed(m, self.pose.position))
     }
 
     /// The gap along the axis of the last step: above the margin only if the hulls are apart along it.
     fn cached_gap(&self, code: u32, view1: &View, view2: &View) -> Real {
-        let index = (code & 0x3FFF_FFFF) as usize;
+        let axis = Axis { code, gap: 0.0 };
+        let (index, (e1, e2)) = (axis.index(), axis.edges());
         match code & EDGES {
             FACE1 if index < self.polyhedron1.planes.len() => view1.face_gap(index),
             FACE2 if index < self.polyhedron2.planes.len() => view2.face_gap(index),
-            EDGES => {
-                let (e1, e2) = (index >> 15, index & 0x7FFF);
-                if e1 >= self.polyhedron1.edges.len() || e2 >= self.polyhedron2.edges.len() {
-                    return -Real::MAX;
-                }
-                let m = self.pose.rotation.to_mat3();
-                let edge1 = Edge::new(&self.polyhedron1, e1);
-                let edge2 = Edge::new(&self.polyhedron2, e2).placed(&m, self.pose.position);
-                edge1.gap(&edge2).map_or(-Real::MAX, |(gap, _)| gap)
+            EDGES if e1 < self.polyhedron1.edges.len() && e2 < self.polyhedron2.edges.len() => {
+                self.edge_gap(axis, &view1.m).map_or(-Real::MAX, |(gap, _)| gap)
             }
             _ => -Real::MAX,
         }
     }
 
-    /// The axis to build the contact on, or one along which the hulls are apart by more than the margin.
-    fn best_axis(&self, view1: &View, view2: &View, size: Real) -> Axis {
+    /// The face to build the contact on, or one along which the hulls are apart by more than the margin.
+    fn best_face(&self, view1: &View, view2: &View, size: Real) -> Axis {
         let (face, gap) = view1.best_face(-Real::MAX);
-        let mut best = Axis { code: FACE1 | face as u32, gap };
+        let best = Axis { code: FACE1 | face as u32, gap };
         if gap > self.margin {
             return best;
         }
-        let (face, gap) = view2.best_face(best.gap + FACE_BIAS * size);
-        if gap > best.gap + FACE_BIAS * size {
-            best = Axis { code: FACE2 | face as u32, gap };
-        }
-        if best.gap > self.margin {
-            return best;
-        }
-        self.best_edges(view1, view2, best.gap + EDGE_BIAS * size).unwrap_or(best)
+        let floor = gap + FACE_BIAS * size;
+        let (face, gap) = view2.best_face(floor);
+        if gap > floor { Axis { code: FACE2 | face as u32, gap } } else { best }
     }
 
     /// The edge pair with the largest gap, if that is above `floor`.
@@ -226,15 +265,17 @@ impl HullPair<'_> {
     }
 
     /// Closest points of the two edges.
-    fn edge_contact(&self, index: usize, m: &Mat3, manifold: &mut Manifold) {
-        let edge1 = Edge::new(&self.polyhedron1, index >> 15);
-        let edge2 = Edge::new(&self.polyhedron2, index & 0x7FFF).placed(m, self.pose.position);
+    fn edge_contact(&self, edges: Axis, m: &Mat3, manifold: &mut Manifold) {
+        let (e1, e2) = edges.edges();
+        let edge1 = Edge::new(&self.polyhedron1, e1);
+        let edge2 = Edge::new(&self.polyhedron2, e2).placed(m, self.pose.position);
         let Some((separation, normal)) = edge1.gap(&edge2) else { return };
         let (d1, d2, w) = (edge1.along, edge2.along, edge2.start - edge1.start);
         let (a11, a12, a22) = (d1.dot(d1), d1.dot(d2), d2.dot(d2));
         let s = (w.dot(d1) * a22 - w.dot(d2) * a12) / (a11 * a22 - a12 * a12);
         let point1 = edge1.start + d1 * clamp(s, 0.0, 1.0);
-        manifold.push(ManifoldPoint { point1, normal, separation, feature: 0x8000_0000 | index as u32 });
+        let feature = 0x8000_0000 | edges.index() as u32;
+        manifold.push(ManifoldPoint { point1, normal, separation, feature });
     }
 
     /// Hulls that pass each other with no corner over the other's face: the closest points, or the deepest corner.
@@ -247,7 +288,7 @@ impl HullPair<'_> {
             }
             return;
         }
-        let index = (axis.code & 0x3FFF_FFFF) as usize;
+        let index = axis.index();
         if axis.code & EDGES == FACE1 {
             let normal = self.polyhedron1.planes[index].normal;
             let point1 = view1.lowest_corner(normal) - normal * axis.gap;
