@@ -521,3 +521,42 @@ fn features_do_not_flicker_in_a_resting_stack() {
         }
     }
 }
+
+/// Two boxes on their edges, crossed: however little they overlap, the normal is square to both edges, not that of a face 45° off.
+#[test]
+fn crossed_edges_push_square_to_both() {
+    let cube = Shape::cuboid(Vec3::splat(0.5)).unwrap();
+    let hull = box_hull(Vec3::splat(0.5));
+    let eighth = |x: Real, z: Real| Rotation::from_xyzw(x, 0.0, z, libm::cosf(std::f32::consts::PI / 8.0)).normalize();
+    let sine = libm::sinf(std::f32::consts::PI / 8.0);
+    for (a, b) in [(&cube, &cube), (&hull, &hull), (&cube, &hull)] {
+        for depth in [-0.01, -0.001, 0.001, 0.005, 0.05] {
+            let pose1 = Pose::new(Vec3::ZERO, eighth(0.0, sine));
+            let pose2 = Pose::new(Vec3::new(0.02, 2.0_f32.sqrt() - depth, 0.03), eighth(sine, 0.0));
+            let m = contacts(a, b, &pose1.relative(&pose2), 0.02);
+            assert_eq!(m.points().len(), 1, "{depth}");
+            let p = m.points()[0];
+            assert!((pose1.rotation.rotate(p.normal) - Vec3::Y).length() < 1e-4);
+            assert!((p.separation + depth).abs() < 1e-5);
+            let at = pose1.transform_point(p.point1);
+            assert!((at - Vec3::new(0.0, 0.5 * 2.0_f32.sqrt(), 0.03)).length() < 1e-4, "{at}");
+        }
+    }
+}
+
+/// A box that leans by half a degree on another keeps a patch under it, though an edge pair overlaps a little less.
+#[test]
+fn a_leaning_box_keeps_its_patch() {
+    let mut random = Random(0x3141_5926_5358_9793);
+    let cube = Shape::cuboid(Vec3::splat(0.5)).unwrap();
+    let hull = box_hull(Vec3::splat(0.5));
+    for _ in 0..2000 {
+        let tilt = random.direction() * 0.004;
+        let rotation = Rotation::from_xyzw(tilt.x, tilt.y, tilt.z, 1.0).normalize();
+        let position = Vec3::new(random.between(-0.6, 0.6), 0.995, random.between(-0.6, 0.6));
+        for (a, b) in [(&cube, &cube), (&hull, &hull)] {
+            let m = contacts(a, b, &Pose::new(position, rotation), 0.02);
+            assert!(m.points().len() >= 3 && m.points()[0].normal.y > 0.999, "{position} {rotation:?} {m:?}");
+        }
+    }
+}
