@@ -7,7 +7,7 @@
 //! the cross products of its edges with the segment are tried for the direction of least overlap. If the normal is (nearly) that of a
 //! face, the stretch of the segment over that face gives two points.
 
-use super::distance::{Support, closest};
+use super::distance::{Closest, Support, closest};
 use super::polyhedron::{CuboidFeatures, Polyhedron};
 use super::sphere::{any_perpendicular, push_rounded};
 use super::{Manifold, ManifoldPoint};
@@ -18,6 +18,8 @@ use crate::shape::{Capsule, ConvexHull, Cuboid};
 const PARALLEL_SINE: Real = 0.05;
 /// A normal with a cosine above this to a face is taken to be that face's.
 const FACE_COSINE: Real = 0.998;
+/// A face stands in for the closest points if it is at most this share of the smaller size less deep.
+const FACE_LOSS: Real = 0.01;
 /// An edge must overlap less than the best face by this share of the smaller size to make the contact.
 const EDGE_BIAS: Real = 5e-3;
 
@@ -98,12 +100,7 @@ fn polyhedron_capsule(
         if c.distance > pair.radius + margin {
             return;
         }
-        let along = polyhedron.face_along(c.normal);
-        if polyhedron.planes[along].normal.dot(c.normal) > FACE_COSINE && pair.face_contact(along, manifold) {
-            return;
-        }
-        let separation = c.distance - pair.radius;
-        manifold.push(ManifoldPoint { point1: c.point1, normal: c.normal, separation, feature: 0 });
+        pair.outside_contact(&c, manifold);
         return;
     }
     let size = min(polyhedron.inner_radius, pair.radius);
@@ -115,6 +112,21 @@ fn polyhedron_capsule(
 }
 
 impl CapsulePair<'_> {
+    /// The segment is outside: the face that the normal is almost that of, or the closest points.
+    fn outside_contact(&self, c: &Closest, manifold: &mut Manifold) {
+        let separation = c.distance - self.radius;
+        let face = self.polyhedron.face_along(c.normal);
+        if self.polyhedron.planes[face].normal.dot(c.normal) > FACE_COSINE && self.face_contact(face, manifold) {
+            // Beside an edge the stretch over the face can leave out the closest point.
+            let allowed = separation + FACE_LOSS * min(self.polyhedron.inner_radius, self.radius);
+            if manifold.points().iter().any(|p| p.separation <= allowed) {
+                return;
+            }
+            manifold.clear();
+        }
+        manifold.push(ManifoldPoint { point1: c.point1, normal: c.normal, separation, feature: 0 });
+    }
+
     /// The face furthest from the segment, and how far its nearer end is (negative inside).
     fn best_face(&self) -> (usize, Real) {
         let (mut face, mut best) = (0, -Real::MAX);

@@ -14,9 +14,12 @@
 //! `n · (m − v)` is at most the larger of the values at its ends, over the cosine of half the arc where that is positive. What
 //! cannot beat the best gap so far is skipped; in round hulls this leaves the few features next to the contact.
 //!
+//! Faces and edges are weighed against each other as in the cuboid kernel, with the inner radius as the size of a hull.
+//!
 //! The cache holds the last axis. It only ends the search early, when the hulls are still apart along it.
 
 use super::clip::{ClipPoint, clip_polygon, reduce};
+use super::cuboid::{ALIGNED, EDGE_BIAS, stands_in};
 use super::distance::{Support, closest};
 use super::polyhedron::{CuboidFeatures, Polyhedron};
 use super::{Manifold, ManifoldPoint, PairCache};
@@ -25,14 +28,21 @@ use crate::shape::{ConvexHull, Cuboid, HalfEdge};
 
 /// A face of hull 2 is the reference when it is better by this share of the smaller inner radius.
 const FACE_BIAS: Real = 2e-3;
-/// An edge pair makes the contact when it is better by this share of the smaller inner radius.
-const EDGE_BIAS: Real = 5e-3;
+/// An edge pair is looked at when it is better than the best face by this share of the smaller inner radius.
+const EDGE_GAIN: Real = 2e-4;
 /// Share of the smaller inner radius by which side planes are moved out, so that corners on the border stay corners.
 const GROWTH: Real = 1e-4;
 /// Edges with `sin²` of their angle below this are parallel: faces stand in for them.
 const PARALLEL: Real = 1e-5;
 /// Edges of hull 2 that are held in the frame of hull 1 at a time.
 const BATCH: usize = 32;
+
+/// Edges that are tried at once.
+const LANES: usize = 8;
+/// A hull of 255 corners has at most 506 faces.
+const MAX_FACES: usize = 512;
+/// A hull of 255 corners has at most 759 edges.
+const MAX_EDGES: usize = 768;
 
 const FACE1: u32 = 1 << 30;
 const FACE2: u32 = 2 << 30;
@@ -82,6 +92,18 @@ struct Axis {
     gap: Real,
 }
 
+impl Axis {
+    /// The face, for a face axis.
+    fn index(self) -> usize {
+        (self.code & 0x3FFF_FFFF) as usize
+    }
+
+    /// The edges of hull 1 and hull 2, for a pair of edges.
+    fn edges(self) -> (usize, usize) {
+        (self.index() >> 15, self.index() & 0x7FFF)
+    }
+}
+
 /// An edge with the normals of its faces, all in the frame of hull 1.
 #[derive(Clone, Copy, Default)]
 struct Edge {
@@ -99,6 +121,17 @@ struct View<'a> {
     /// Axes and centre of the other hull's frame in the own one.
     m: Mat3,
     t: Vec3,
+    /// Height of the other centre over each of the own faces.
+    heights: [Real; MAX_FACES],
+}
+
+/// [`LANES`] edges of hull 2, turned into the frame of hull 1: an edge of hull 1 is tried against all of them at once.
+#[derive(Clone, Copy, Default)]
+struct EdgeGroup {
+    indices: [u16; LANES],
+    along: [[Real; LANES]; 3],
+    left: [[Real; LANES]; 3],
+    right: [[Real; LANES]; 3],
 }
 
 impl HullPair<'_> {
@@ -108,94 +141,123 @@ impl HullPair<'_> {
         let m = self.pose.rotation.to_mat3();
         let inverse = m.transpose();
         let t = self.pose.position;
-        let view1 = View { own: &self.polyhedron1, other: &self.polyhedron2, m, t };
-        let view2 = View { own: &self.polyhedron2, other: &self.polyhedron1, m: inverse, t: -(inverse * t) };
+        let mut view1 = View::new(&self.polyhedron1, &self.polyhedron2, m, t);
+        let mut view2 = View::new(&self.polyhedron2, &self.polyhedron1, inverse, -(inverse * t));
         if self.cached_gap(cache.words[0], &view1, &view2) > self.margin {
             return;
         }
         let size = min(self.polyhedron1.inner_radius, self.polyhedron2.inner_radius);
-        let axis = self.best_axis(&view1, &view2, size);
-        cache.words[0] = axis.code;
-        if axis.gap > self.margin {
+        view1.measure_heights();
+        view2.measure_heights();
+        let face = self.best_face(&view1, &view2, size);
+        cache.words[0] = face.code;
+        if face.gap > self.margin {
             return;
         }
-        let index = (axis.code & 0x3FFF_FFFF) as usize;
-        match axis.code & EDGES {
-            FACE1 => view1.face_contact(index, (self.margin, size), manifold),
-            FACE2 => {
-                view2.face_contact(index, (self.margin, size), manifold);
-                // Found in the frame of hull 2 with the roles swapped.
-                for p in manifold.points_mut() {
-                    p.point1 = m * p.point2() + t;
-                    p.normal = -(m * p.normal);
-                    p.feature ^= 0x4000_0000;
-                }
+        let edges = self.best_edges(&view1, &view2, face.gap + EDGE_GAIN * size);
+        if let Some(edges) = edges {
+            cache.words[0] = edges.code;
+            if edges.gap > self.margin {
+                return;
             }
-            _ => self.edge_contact(index, &m, manifold),
+            if !self.is_aligned(edges, face, &m) {
+                self.edge_contact(edges, &m, manifold);
+                return;
+            }
+        }
+        self.face_contact(face, (&view1, &view2), size, manifold);
+        if let Some(edges) = edges
+            && !stands_in(manifold, edges.gap - EDGE_BIAS * size)
+        {
+            manifold.clear();
+            self.edge_contact(edges, &m, manifold);
         }
         if manifold.points().is_empty() {
-            self.passing_by(axis, &view1, &view2, manifold);
+            self.passing_by(face, &view1, &view2, manifold);
         }
+    }
+
+    /// Clips the incident face of one hull against the reference face of the other.
+    fn face_contact(&self, face: Axis, (view1, view2): (&View, &View), size: Real, manifold: &mut Manifold) {
+        if face.code & EDGES == FACE1 {
+            view1.face_contact(face.index(), (self.margin, size), manifold);
+            return;
+        }
+        view2.face_contact(face.index(), (self.margin, size), manifold);
+        // Found in the frame of hull 2 with the roles swapped.
+        for p in manifold.points_mut() {
+            p.point1 = view1.m * p.point2() + view1.t;
+            p.normal = -(view1.m * p.normal);
+            p.feature ^= 0x4000_0000;
+        }
+    }
+
+    /// Whether the axis of a pair of edges is almost the normal of a face.
+    fn is_aligned(&self, edges: Axis, face: Axis, m: &Mat3) -> bool {
+        let normal = if face.code & EDGES == FACE1 {
+            self.polyhedron1.planes[face.index()].normal
+        } else {
+            -(*m * self.polyhedron2.planes[face.index()].normal)
+        };
+        self.edge_gap(edges, m).is_some_and(|(_, axis)| axis.dot(normal) > ALIGNED)
+    }
+
+    /// Gap and normal of a pair of edges that makes a face of the Minkowski difference.
+    fn edge_gap(&self, edges: Axis, m: &Mat3) -> Option<(Real, Vec3)> {
+        let (e1, e2) = edges.edges();
+        Edge::new(&self.polyhedron1, e1).gap(&Edge::new(&self.polyhedron2, e2).placed(m, self.pose.position))
     }
 
     /// The gap along the axis of the last step: above the margin only if the hulls are apart along it.
     fn cached_gap(&self, code: u32, view1: &View, view2: &View) -> Real {
-        let index = (code & 0x3FFF_FFFF) as usize;
+        let axis = Axis { code, gap: 0.0 };
+        let (index, (e1, e2)) = (axis.index(), axis.edges());
         match code & EDGES {
             FACE1 if index < self.polyhedron1.planes.len() => view1.face_gap(index),
             FACE2 if index < self.polyhedron2.planes.len() => view2.face_gap(index),
-            EDGES => {
-                let (e1, e2) = (index >> 15, index & 0x7FFF);
-                if e1 >= self.polyhedron1.edges.len() || e2 >= self.polyhedron2.edges.len() {
-                    return -Real::MAX;
-                }
-                let m = self.pose.rotation.to_mat3();
-                let edge1 = Edge::new(&self.polyhedron1, e1);
-                let edge2 = Edge::new(&self.polyhedron2, e2).placed(&m, self.pose.position);
-                edge1.gap(&edge2).map_or(-Real::MAX, |(gap, _)| gap)
+            EDGES if e1 < self.polyhedron1.edges.len() && e2 < self.polyhedron2.edges.len() => {
+                self.edge_gap(axis, &view1.m).map_or(-Real::MAX, |(gap, _)| gap)
             }
             _ => -Real::MAX,
         }
     }
 
-    /// The axis to build the contact on, or one along which the hulls are apart by more than the margin.
-    fn best_axis(&self, view1: &View, view2: &View, size: Real) -> Axis {
+    /// The face to build the contact on, or one along which the hulls are apart by more than the margin.
+    fn best_face(&self, view1: &View, view2: &View, size: Real) -> Axis {
         let (face, gap) = view1.best_face(-Real::MAX);
-        let mut best = Axis { code: FACE1 | face as u32, gap };
+        let best = Axis { code: FACE1 | face as u32, gap };
         if gap > self.margin {
             return best;
         }
-        let (face, gap) = view2.best_face(best.gap + FACE_BIAS * size);
-        if gap > best.gap + FACE_BIAS * size {
-            best = Axis { code: FACE2 | face as u32, gap };
-        }
-        if best.gap > self.margin {
-            return best;
-        }
-        self.best_edges(view1, view2, best.gap + EDGE_BIAS * size).unwrap_or(best)
+        let floor = gap + FACE_BIAS * size;
+        let (face, gap) = view2.best_face(floor);
+        if gap > floor { Axis { code: FACE2 | face as u32, gap } } else { best }
     }
 
     /// The edge pair with the largest gap, if that is above `floor`.
     fn best_edges(&self, view1: &View, view2: &View, floor: Real) -> Option<Axis> {
-        let mut list1 = [0u16; 1024];
-        let mut list2 = [0u16; 1024];
+        let mut list1 = [0u16; MAX_EDGES];
+        let mut list2 = [0u16; MAX_EDGES];
         let count1 = view1.promising_edges(floor, &mut list1);
         let count2 = view2.promising_edges(floor, &mut list2);
         let m = self.pose.rotation.to_mat3();
         let mut best = Axis { code: 0, gap: floor };
-        for batch in list2[..count2].chunks(BATCH) {
-            let mut edges2 = [Edge::default(); BATCH];
-            for (edge, &index) in edges2.iter_mut().zip(batch) {
-                *edge = Edge::new(&self.polyhedron2, index as usize).placed(&m, self.pose.position);
+        for indices in list2[..count2].chunks(BATCH) {
+            let mut groups = [EdgeGroup::default(); BATCH / LANES];
+            for (group, indices) in groups.iter_mut().zip(indices.chunks(LANES)) {
+                group.fill(&self.polyhedron2, indices, &m);
             }
             for &index in &list1[..count1] {
                 let edge1 = Edge::new(&self.polyhedron1, index as usize);
-                for edge2 in &edges2[..batch.len()] {
-                    if let Some((gap, _)) = edge1.gap(edge2)
-                        && gap > best.gap
-                    {
-                        best = Axis { code: EDGES | u32::from(index) << 15 | u32::from(edge2.index), gap };
-                    }
+                for group in &groups[..indices.len().div_ceil(LANES)] {
+                    group.for_each_crossing(&edge1, |index2| {
+                        let edge2 = Edge::new(&self.polyhedron2, index2 as usize).placed(&m, self.pose.position);
+                        if let Some((gap, _)) = edge1.gap(&edge2)
+                            && gap > best.gap
+                        {
+                            best = Axis { code: EDGES | u32::from(index) << 15 | u32::from(index2), gap };
+                        }
+                    });
                 }
             }
         }
@@ -203,15 +265,17 @@ impl HullPair<'_> {
     }
 
     /// Closest points of the two edges.
-    fn edge_contact(&self, index: usize, m: &Mat3, manifold: &mut Manifold) {
-        let edge1 = Edge::new(&self.polyhedron1, index >> 15);
-        let edge2 = Edge::new(&self.polyhedron2, index & 0x7FFF).placed(m, self.pose.position);
+    fn edge_contact(&self, edges: Axis, m: &Mat3, manifold: &mut Manifold) {
+        let (e1, e2) = edges.edges();
+        let edge1 = Edge::new(&self.polyhedron1, e1);
+        let edge2 = Edge::new(&self.polyhedron2, e2).placed(m, self.pose.position);
         let Some((separation, normal)) = edge1.gap(&edge2) else { return };
         let (d1, d2, w) = (edge1.along, edge2.along, edge2.start - edge1.start);
         let (a11, a12, a22) = (d1.dot(d1), d1.dot(d2), d2.dot(d2));
         let s = (w.dot(d1) * a22 - w.dot(d2) * a12) / (a11 * a22 - a12 * a12);
         let point1 = edge1.start + d1 * clamp(s, 0.0, 1.0);
-        manifold.push(ManifoldPoint { point1, normal, separation, feature: 0x8000_0000 | index as u32 });
+        let feature = 0x8000_0000 | edges.index() as u32;
+        manifold.push(ManifoldPoint { point1, normal, separation, feature });
     }
 
     /// Hulls that pass each other with no corner over the other's face: the closest points, or the deepest corner.
@@ -224,7 +288,7 @@ impl HullPair<'_> {
             }
             return;
         }
-        let index = (axis.code & 0x3FFF_FFFF) as usize;
+        let index = axis.index();
         if axis.code & EDGES == FACE1 {
             let normal = self.polyhedron1.planes[index].normal;
             let point1 = view1.lowest_corner(normal) - normal * axis.gap;
@@ -282,7 +346,59 @@ impl Edge {
     }
 }
 
-impl View<'_> {
+impl EdgeGroup {
+    /// Lanes past the last edge keep their zeros, which never cross.
+    fn fill(&mut self, polyhedron: &Polyhedron, indices: &[u16], m: &Mat3) {
+        for (k, &index) in indices.iter().enumerate() {
+            let edge = Edge::new(polyhedron, index as usize);
+            self.indices[k] = index;
+            let lists = [&mut self.along, &mut self.left, &mut self.right];
+            for (list, v) in lists.into_iter().zip([edge.along, edge.left, edge.right]) {
+                let v = *m * v;
+                (list[0][k], list[1][k], list[2][k]) = (v.x, v.y, v.z);
+            }
+        }
+    }
+
+    /// Calls back with each edge whose arc crosses that of `edge`.
+    #[inline(always)]
+    fn for_each_crossing(&self, edge: &Edge, mut found: impl FnMut(u16)) {
+        let (c, d) = (dots(edge.along, &self.left), dots(edge.along, &self.right));
+        let (a, b) = (dots(edge.left, &self.along), dots(edge.right, &self.along));
+        let mut sign = [0.0; LANES];
+        for k in 0..LANES {
+            sign[k] = max(max(c[k] * d[k], a[k] * b[k]), c[k] * b[k]);
+        }
+        for (k, &sign) in sign.iter().enumerate() {
+            if sign < 0.0 {
+                found(self.indices[k]);
+            }
+        }
+    }
+}
+
+/// `u · v` for each lane.
+#[inline(always)]
+fn dots(u: Vec3, v: &[[Real; LANES]; 3]) -> [Real; LANES] {
+    let mut sum = [0.0; LANES];
+    for k in 0..LANES {
+        sum[k] = u.x * v[0][k] + u.y * v[1][k] + u.z * v[2][k];
+    }
+    sum
+}
+
+impl<'a> View<'a> {
+    fn new(own: &'a Polyhedron<'a>, other: &'a Polyhedron<'a>, m: Mat3, t: Vec3) -> Self {
+        Self { own, other, m, t, heights: [0.0; MAX_FACES] }
+    }
+
+    fn measure_heights(&mut self) {
+        let center = self.m * self.other.center + self.t;
+        for (height, plane) in self.heights.iter_mut().zip(self.own.planes) {
+            *height = plane.normal.dot(center) - plane.offset;
+        }
+    }
+
     /// Height of the other hull over the plane of a face.
     fn face_gap(&self, face: usize) -> Real {
         let plane = self.own.planes[face];
@@ -293,27 +409,21 @@ impl View<'_> {
 
     /// The first face with the largest gap; faces that cannot reach `floor` are not looked at.
     fn best_face(&self, floor: Real) -> (usize, Real) {
-        let center = self.m * self.other.center + self.t;
-        let bound = |face: usize| {
-            let plane = self.own.planes[face];
-            plane.normal.dot(center) - plane.offset
-        };
+        let heights = &self.heights[..self.own.planes.len()];
         // The face that the other centre is highest above is most often the one: its gap prunes the others.
         let mut first = 0;
-        let mut highest = bound(0);
-        for face in 1..self.own.planes.len() {
-            let b = bound(face);
-            if b > highest {
-                (first, highest) = (face, b);
+        for (face, &height) in heights.iter().enumerate() {
+            if height > heights[first] {
+                first = face;
             }
         }
         let radius = self.other.inner_radius * (1.0 - 1e-4);
-        if highest - radius < floor {
+        if heights[first] - radius < floor {
             return (first, -Real::MAX);
         }
         let (mut best, mut gap) = (first, self.face_gap(first));
-        for face in 0..self.own.planes.len() {
-            if face == first || bound(face) - radius < max(gap, floor) {
+        for (face, &height) in heights.iter().enumerate() {
+            if face == first || height - radius < max(gap, floor) {
                 continue;
             }
             let g = self.face_gap(face);
@@ -325,27 +435,22 @@ impl View<'_> {
     }
 
     /// Lists the edges (one half of each) that can have a gap above `floor`.
-    fn promising_edges(&self, floor: Real, list: &mut [u16; 1024]) -> usize {
-        let center = self.m * self.other.center + self.t;
+    fn promising_edges(&self, floor: Real, list: &mut [u16; MAX_EDGES]) -> usize {
         let limit = floor + self.other.inner_radius * (1.0 - 1e-4);
+        let planes = self.own.planes;
         let mut count = 0;
-        for index in (0..self.own.edges.len()).step_by(2) {
-            let [left, right] = [index, index ^ 1].map(|e| self.own.planes[self.own.edges[e].face as usize].normal);
-            let w = center - self.own.vertices[self.own.edges[index].origin as usize];
-            let highest = max(left.dot(w), right.dot(w));
+        for (pair, twins) in self.own.edges.as_chunks::<2>().0.iter().enumerate() {
+            // The start of the edge is on both planes, so `n · (m − v)` is the height over the plane.
+            let [left, right] = twins.map(|e| e.face as usize);
+            let highest = max(self.heights[left], self.heights[right]);
             // `highest / cos(half the arc) < limit`, with `cos² = (1 + left · right) / 2`, both sides positive.
-            let cosine_squared = 0.5 * (1.0 + left.dot(right));
-            let skip = if highest <= 0.0 {
-                highest < limit
-            } else {
-                limit > 0.0 && highest * highest < limit * limit * cosine_squared
-            };
-            if !skip && count < list.len() {
-                list[count] = index as u16;
-                count += 1;
-            }
+            let cosine_squared = 0.5 * (1.0 + planes[left].normal.dot(planes[right].normal));
+            let rises = (highest > 0.0) & (highest * highest >= limit * limit * cosine_squared);
+            // Written always, counted if it may matter: whether it does is hard to foretell. There is room for all edges.
+            list[count.min(MAX_EDGES - 1)] = 2 * pair as u16;
+            count += ((highest >= limit) | rises) as usize;
         }
-        count
+        count.min(MAX_EDGES)
     }
 
     /// The first corner of the other hull that lies lowest along `normal`, in the own frame.

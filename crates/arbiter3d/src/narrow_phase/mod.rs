@@ -14,12 +14,15 @@
 mod capsule;
 mod clip;
 mod cuboid;
+#[cfg_attr(not(test), expect(dead_code, reason = "sweeps and meshes use the rest of it"))]
 mod distance;
 mod hull;
 mod manifold;
 mod mesh;
 mod polyhedron;
 mod sphere;
+#[cfg_attr(not(test), expect(dead_code, reason = "the continuous phase calls it"))]
+mod time_of_impact;
 
 pub use manifold::{Manifold, ManifoldPoint};
 
