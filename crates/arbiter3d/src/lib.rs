@@ -5,6 +5,6 @@ pub mod narrow_phase;
 mod shape;
 
 pub use shape::{
-    Capsule, ConvexHull, Cuboid, HalfEdge, MassProperties, MeshNode, MeshSides, Plane, Shape, ShapeError, Sphere,
-    TriangleMesh,
+    Capsule, ConvexHull, Cuboid, HalfEdge, MassProperties, MeshEdge, MeshNode, MeshRayHit, MeshSides, Plane, Shape,
+    ShapeError, Sphere, TriangleMesh,
 };
