@@ -53,11 +53,7 @@ impl TriangleMesh {
     ///
     /// # Errors
     /// As [`TriangleMesh::new`].
-    pub fn with_sides(
-        vertices: Vec<Vec3>,
-        triangles: Vec<[u32; 3]>,
-        sides: MeshSides,
-    ) -> Result<Self, ShapeError> {
+    pub fn with_sides(vertices: Vec<Vec3>, triangles: Vec<[u32; 3]>, sides: MeshSides) -> Result<Self, ShapeError> {
         if triangles.is_empty() {
             return Err(ShapeError::EmptyMesh);
         }
