@@ -6,6 +6,8 @@
 mod capsule;
 mod cuboid;
 mod hull;
+mod hull_builder;
+mod hull_merge;
 mod mass;
 mod mesh;
 mod mesh_edges;
@@ -63,10 +65,16 @@ pub enum ShapeError {
     TooManyFeatures {
         /// "vertices", "faces" or "edges".
         what: &'static str,
-        /// How many it would need.
+        /// How many it would need, at least.
         count: usize,
         /// How many it may have.
         limit: usize,
+    },
+    /// A hull so small or large that its volume or inertia overflows or vanishes.
+    #[error("the hull is {size} m large: its volume and inertia do not fit single precision; use 1e-7 m to 1e7 m")]
+    SizeOutOfRange {
+        /// Its largest extent, metres.
+        size: Real,
     },
     /// A mesh without triangles.
     #[error("the mesh has no triangles")]
