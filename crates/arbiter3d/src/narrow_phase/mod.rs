@@ -17,8 +17,11 @@ mod cuboid;
 mod distance;
 mod manifold;
 mod mesh;
+mod mesh_points;
 mod polyhedron;
 mod sphere;
+mod triangle;
+mod triangle_solid;
 
 pub use manifold::{Manifold, ManifoldPoint};
 

@@ -20,7 +20,6 @@ pub use hull::{ConvexHull, HalfEdge, Plane};
 pub use mass::MassProperties;
 pub(crate) use mesh::Facet;
 pub use mesh::{MeshEdge, MeshNode, MeshRayHit, MeshSides, TriangleMesh};
-pub(crate) use mesh_edges::Neighborhood;
 pub use sphere::Sphere;
 
 use crate::math::{Aabb, Pose, Real, Vec3};
