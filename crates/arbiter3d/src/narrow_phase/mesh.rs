@@ -91,18 +91,14 @@ impl Contact<'_> {
 /// A candidate in the frame of the mesh, with the exact normal of its triangle.
 fn point_in_mesh(mesh: &TriangleMesh, frame: &Frame, candidate: &Candidate) -> ManifoldPoint {
     let turned = frame.rotation * candidate.normal;
-    let normal = if candidate.facet == NO_FACET {
-        turned * (1.0 / turned.length())
-    } else {
-        let normal: Vec3 = mesh.facet(candidate.facet as usize).normal;
-        if normal.dot(turned) < 0.0 { -normal } else { normal }
-    };
-    ManifoldPoint {
-        point1: frame.rotation * candidate.position + frame.position,
-        normal,
-        separation: candidate.separation,
-        feature: candidate.feature,
+    let (separation, feature) = (candidate.separation, candidate.feature);
+    let point1 = frame.rotation * candidate.position + frame.position;
+    if candidate.facet == NO_FACET {
+        return ManifoldPoint { point1, normal: turned * (1.0 / turned.length()), separation, feature };
     }
+    let normal: Vec3 = mesh.facet(candidate.facet as usize).normal;
+    let normal = if normal.dot(turned) < 0.0 { -normal } else { normal };
+    ManifoldPoint { point1, normal, separation, feature }
 }
 
 #[cfg(test)]

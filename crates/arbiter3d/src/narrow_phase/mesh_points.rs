@@ -33,14 +33,16 @@ const MOST_GROUPS: usize = 6;
 const SAME_NORMAL: Real = 0.99985;
 /// Cosines at which groups are tried: 8°, 25°, 60°, 90°, 120°, anything.
 const MERGE: [Real; 6] = [0.99, 0.9, 0.5, 0.0, -0.5, -2.0];
+/// Points less deep than the deepest by this share of the tolerance count as deepest: rounding, not rocking.
+const EQUALLY_DEEP: Real = 0.02;
 /// Another choice must be better by this share, so that rounding does not swap equal ones from step to step.
-const TIE: Real = 1.001;
+const TIE: Real = 1.000_001;
 
 /// The points found so far.
 pub(super) struct Candidates {
     list: [Candidate; CAPACITY],
     count: usize,
-    /// Points less deep than the deepest by no more than this count as deepest, metres.
+    /// Length below which points do not differ, metres.
     tolerance: Real,
     /// The least separation of all points.
     deepest: Real,
@@ -55,13 +57,7 @@ struct Groups {
 
 impl Candidates {
     pub(super) fn new(tolerance: Real) -> Self {
-        let none = Candidate {
-            position: Vec3::ZERO,
-            normal: Vec3::ZERO,
-            separation: 0.0,
-            feature: 0,
-            facet: NO_FACET,
-        };
+        let none = Candidate { position: Vec3::ZERO, normal: Vec3::ZERO, separation: 0.0, feature: 0, facet: NO_FACET };
         Self { list: [none; CAPACITY], count: 0, tolerance, deepest: Real::MAX }
     }
 
@@ -165,7 +161,7 @@ impl Candidates {
         let mut best = (0, -Real::MAX);
         for (i, candidate) in self.members(groups, group) {
             let reach = candidate.position.dot(outwards);
-            if candidate.separation <= least + self.tolerance && reach > best.1 {
+            if candidate.separation <= least + EQUALLY_DEEP * self.tolerance && reach > best.1 {
                 best = (i, reach);
             }
         }

@@ -15,6 +15,9 @@ const ALLOWED_SINE: Real = 2e-3;
 /// A sphere counts as above a face up to this sine beyond its edges: seams flatter than that have no normals of their own.
 const SEAM_SINE: Real = 2e-3;
 
+/// Corners visited at most to learn whether a surface goes on.
+const MOST_CLIMBS: usize = 256;
+
 /// Where the convex shape is.
 pub(super) struct Frame {
     /// From the shape's frame to the mesh's.
@@ -44,6 +47,9 @@ pub(super) struct Triangle<'a> {
     pub(super) corners: [Vec3; 3],
     /// Unit normal on the side of the shape's centre.
     pub(super) normal: Vec3,
+    /// Of the plane: `normal · x = offset`. Computed in the mesh's axes, where a large triangle's corners are not rounded
+    /// by turning them.
+    offset: Real,
     /// Unit vectors in the plane from each edge inwards.
     pub(super) inward: [Vec3; 3],
     /// How far the edges are let out, so that a point exactly on a seam belongs to both triangles.
@@ -68,6 +74,7 @@ impl<'a> Triangle<'a> {
             index: index as u32,
             corners,
             normal: front * side,
+            offset: facet.normal.dot(facet.corners[0] - frame.position) * side,
             inward: [inward(0), inward(1), inward(2)],
             slack: 1e-3 * scale + 2e-7 * size,
         }
@@ -76,7 +83,7 @@ impl<'a> Triangle<'a> {
     /// Height of a point above the plane.
     #[inline(always)]
     pub(super) fn height(&self, point: Vec3) -> Real {
-        self.normal.dot(point - self.corners[0])
+        self.normal.dot(point) - self.offset
     }
 
     /// Ends of edge `i`.
@@ -106,11 +113,36 @@ impl<'a> Triangle<'a> {
         }
         let normal = self.frame.rotation * normal;
         let corner = self.facet.corners[i];
-        let ends = self.mesh.corner_ends(self.mesh.neighborhood(self.index as usize).corners[i]);
-        ends.iter().all(|end| {
-            let along = *end - corner;
+        let mut ends = self.mesh.corner_ends(self.mesh.neighborhood(self.index as usize).corners[i]);
+        ends.all(|(end, _)| {
+            let along = end - corner;
             along.dot(normal) <= ALLOWED_SINE * along.length()
         })
+    }
+
+    /// Whether the surface goes on from corner `i` by `distance` along `normal` before it has fallen by `fall` under the
+    /// plane of this triangle: steepest climb from corner to corner.
+    pub(super) fn goes_on(&self, i: usize, normal: Vec3, distance: Real, fall: Real) -> bool {
+        let (along, up) = (self.frame.rotation * normal, self.frame.rotation * self.normal);
+        let start = self.facet.corners[i];
+        let mut corner = self.mesh.neighborhood(self.index as usize).corners[i];
+        let mut reached = 0.0;
+        for _ in 0..MOST_CLIMBS {
+            let mut next = None;
+            for (end, number) in self.mesh.corner_ends(corner) {
+                let step = end - start;
+                if step.dot(along) > reached && step.dot(up) >= -fall {
+                    (reached, next) = (step.dot(along), Some(number));
+                }
+            }
+            let Some(number) = next else { return false };
+            if reached >= distance {
+                return true;
+            }
+            corner = number;
+        }
+        // So finely cut that it went on for hundreds of edges: it is no rim.
+        true
     }
 
     /// The part of the segment from `a` to `b` above the face, as two numbers in `[0, 1]`, and which edges cut it off
@@ -256,14 +288,17 @@ impl Solid for Capsule {
         }
         let mut missing = lowest < self.radius();
         if let Some((ends, cuts)) = triangle.clip(-end, end) {
+            let heights = ends.map(|t| low + (high - low) * t);
+            // A segment that runs under the triangle without crossing it counts only while the capsule still reaches up
+            // through the plane.
+            let crosses = crate::math::max(heights[0], heights[1]) >= -self.radius();
             let count = if ends[1] - ends[0] > 1e-6 { 2 } else { 1 };
             for k in 0..count {
-                let point = end * (2.0 * ends[k] - 1.0);
-                let height = low + (high - low) * ends[k];
-                if height - self.radius() <= reach.margin && self.reaches(point - triangle.normal * height, height, reach)
-                {
-                    let which = if cuts[k] == 3 { k as u32 } else { 2 + (triangle.facet.id << 3 | cuts[k] << 1 | k as u32) };
-                    out.push(triangle.face_candidate(point, height, self.radius(), which));
+                if crosses && heights[k] - self.radius() <= reach.margin {
+                    let cut = 2 + (triangle.facet.id << 3 | cuts[k] << 1 | k as u32);
+                    let feature = if cuts[k] == 3 { k as u32 } else { cut };
+                    let point = end * (2.0 * ends[k] - 1.0);
+                    out.push(triangle.face_candidate(point, heights[k], self.radius(), feature));
                     missing = false;
                 }
             }
@@ -281,16 +316,6 @@ impl Solid for Capsule {
 }
 
 impl Capsule {
-    /// Whether a point of the plane below the segment is inside the capsule: a part of the segment that runs behind the
-    /// triangle without crossing it does not count. Shallow points need no proof.
-    fn reaches(&self, foot: Vec3, height: Real, reach: &Reach) -> bool {
-        if height >= -reach.scale {
-            return true;
-        }
-        let y = clamp(foot.y, -self.half_length(), self.half_length());
-        (foot - Vec3::new(0.0, y, 0.0)).length() <= self.radius() + reach.scale
-    }
-
     /// The overlap that no face and no summit explains, as a push along the face.
     fn touch_anyway(&self, triangle: &Triangle, out: &mut Candidates) {
         let end = Vec3::new(0.0, self.half_length(), 0.0);

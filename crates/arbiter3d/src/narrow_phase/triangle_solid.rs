@@ -8,8 +8,9 @@
 //!
 //! The axis of least overlap decides who deals with the contact. The face of the triangle: the solid's lowest face is
 //! clipped to the prism over the triangle. Another axis: if the surface has a summit along it there (see `mesh_edges`),
-//! that edge or corner makes the contact; if not, a neighbour reaches further along the axis, and the contact is its.
-//! Triangles without sharp edges, which are most, skip all this: only their face can push.
+//! that edge or corner makes the contact. If not, a neighbour reaches further along the axis. Where the surface goes on so
+//! far that the way out along the face is shorter, the face pushes; else the axis leads over a rim, and the contact is the
+//! neighbour's. Triangles without sharp edges, which are most, skip all this while the overlap is shallow.
 
 use super::mesh_points::{Candidate, Candidates};
 use super::polyhedron::Polyhedron;
@@ -18,6 +19,14 @@ use crate::math::{Real, Vec3, clamp, max, min};
 
 /// An edge, or the face, of a triangle lies level with its highest corner below this sine.
 const LEVEL_SINE: Real = 0.02;
+
+/// Overlaps up to this share of the solid's inner radius are shallow: inside a smooth surface its face alone pushes. Deeper
+/// ones may come from the side (a box past the rim of a finely cut block), so all axes are tried.
+const SHALLOW: Real = 0.5;
+
+/// Axes that push through the triangle to its other side are no way out; those that lean back less tell at least that
+/// the contact is a neighbour's.
+const BACKWARD: Real = -0.7;
 
 /// A cuboid or a hull with the ball around it.
 pub(super) struct Solids<'a> {
@@ -60,7 +69,7 @@ impl Solid for Solids<'_> {
         }
         let pair = Pair { solid: &self.features, triangle, reach, lowest, height };
         let plain = triangle.facet.sharp_edges == 0 && triangle.facet.sharp_corners == 0;
-        if plain && height >= -0.5 * reach.scale && !reach.second_look {
+        if plain && height >= -SHALLOW * self.features.inner_radius && !reach.second_look {
             return pair.touch_face(out) == 0 && height < 0.0;
         }
         let Some((axis, separation)) = pair.least_overlap() else { return false };
@@ -68,6 +77,7 @@ impl Solid for Solids<'_> {
             Some(Axis::Triangle) => pair.touch_face(out),
             Some(Axis::Face { face }) => pair.touch_solid_face(face, out),
             Some(Axis::Edges { edge, solid_edge, normal }) => pair.touch_edges(edge, solid_edge, normal, out),
+            None if separation < 0.0 && pair.is_hemmed_in(axis, separation) => pair.touch_face(out),
             None => 0,
         };
         if points > 0 || separation >= 0.0 {
@@ -111,7 +121,7 @@ impl Pair<'_> {
         let mut best = (Axis::Triangle, self.height);
         let bias = 0.02 * self.reach.scale;
         let mut offer = |axis: Axis, normal: Vec3, separation: Real| {
-            if separation > best.1 + bias && normal.dot(self.triangle.normal) > -0.01 {
+            if separation > best.1 + bias && normal.dot(self.triangle.normal) > BACKWARD {
                 best = (axis, separation);
             }
             separation <= self.reach.margin
@@ -154,6 +164,23 @@ impl Pair<'_> {
         Some(outward * (-1.0 / squared.sqrt()))
     }
 
+    /// Whether the surface around the triangle goes on along an axis so far that the way out along the triangle's normal
+    /// is shorter after all. The surface may fall by half that way, no more: else the axis leads over its rim.
+    fn is_hemmed_in(&self, axis: Axis, separation: Real) -> bool {
+        let normal = match axis {
+            Axis::Triangle => return true,
+            Axis::Face { face } => -self.solid.planes[face].normal,
+            Axis::Edges { normal, .. } => normal,
+        };
+        self.triangle.goes_on(self.top(normal), normal, separation - self.height, -0.5 * self.height)
+    }
+
+    /// The corner of the triangle that is farthest along a direction.
+    fn top(&self, direction: Vec3) -> usize {
+        let [a, b, c] = self.triangle.corners.map(|corner| direction.dot(corner));
+        if a >= b && a >= c { 0 } else { 1 + usize::from(c > b) }
+    }
+
     /// What the axis means for the surface: an axis across a level triangle is the triangle's own; one along which the
     /// surface has no summit here is `None`.
     fn resolve(&self, axis: Axis) -> Option<Axis> {
@@ -164,7 +191,7 @@ impl Pair<'_> {
             Axis::Face { face } => {
                 let normal = -self.solid.planes[face].normal;
                 let rise = triangle.corners.map(|corner| normal.dot(corner));
-                let top = if rise[0] >= rise[1] && rise[0] >= rise[2] { 0 } else { 1 + usize::from(rise[2] > rise[1]) };
+                let top = self.top(normal);
                 let level = |i: usize| {
                     let length = (triangle.corners[i] - triangle.corners[top]).length();
                     rise[top] - rise[i] <= LEVEL_SINE * length
@@ -209,7 +236,8 @@ impl Pair<'_> {
                 *under &= inside.dot(*corner - a) > 0.0;
             }
             let Some((ends, cuts)) = triangle.clip(a, b) else { continue };
-            let start = if cuts[0] == 3 { u32::from(self.solid.edges[edge].origin) } else { self.cut(edge, cuts[0], 0) };
+            let start =
+                if cuts[0] == 3 { u32::from(self.solid.edges[edge].origin) } else { self.cut(edge, cuts[0], 0) };
             points += self.face_point(a + (b - a) * ends[0], start, out);
             if cuts[1] != 3 {
                 points += self.face_point(a + (b - a) * ends[1], self.cut(edge, cuts[1], 1), out);
@@ -232,23 +260,14 @@ impl Pair<'_> {
         feature_id(self.triangle.facet.id, 1024 + (((edge as u32) << 3) | (cut << 1) | end))
     }
 
-    /// A point of the solid over the triangle. One far below the plane counts only if the solid really reaches through
-    /// the triangle there, and does not pass below it.
+    /// A point of the solid over (or under) the triangle.
     fn face_point(&self, point: Vec3, feature: u32, out: &mut Candidates) -> usize {
         let height = self.triangle.height(point);
         if height > self.reach.margin {
             return 0;
         }
-        if height < -0.5 * self.reach.scale && !self.contains(point - self.triangle.normal * height) {
-            return 0;
-        }
         out.push(self.triangle.face_candidate(point, height, 0.0, feature));
         1
-    }
-
-    fn contains(&self, point: Vec3) -> bool {
-        let slack = 0.1 * self.reach.scale;
-        self.solid.planes.iter().all(|plane| plane.normal.dot(point) <= plane.offset + slack)
     }
 
     /// The triangle's edges cut by the prism over a face of the solid.
@@ -358,4 +377,3 @@ impl Pair<'_> {
         });
     }
 }
-

@@ -230,10 +230,10 @@ impl TriangleMesh {
         &self.neighborhoods[index]
     }
 
-    /// The far ends of all edges that meet in a welded corner.
+    /// The far ends of all edges that meet in a welded corner, and their welded numbers.
     #[inline]
-    pub(crate) fn corner_ends(&self, corner: u32) -> &[Vec3] {
-        self.adjacency.ends(corner)
+    pub(crate) fn corner_ends(&self, corner: u32) -> impl Iterator<Item = (Vec3, u32)> {
+        self.adjacency.ends(corner).iter().map(|&end| (self.vertices[end as usize], end))
     }
 }
 

@@ -47,7 +47,7 @@ pub(super) struct Adjacency {
     /// Bit `i`: a convex or open edge starts or ends in welded corner `i`.
     pub(super) sharp: Vec<bool>,
     first: Vec<u32>,
-    ends: Vec<Vec3>,
+    ends: Vec<u32>,
 }
 
 /// One side of an edge: its welded ends in ascending order, then whose it is.
@@ -74,13 +74,13 @@ impl Adjacency {
                 adjacency.join(side, normals[side.2 as usize], inward(side), candidates);
             }
         }
-        adjacency.link_corners(vertices, &sides);
+        adjacency.link_corners(vertices.len(), &sides);
         adjacency.flatten_patches();
         adjacency
     }
 
-    /// Ends of the edges that leave a welded corner.
-    pub(super) fn ends(&self, corner: u32) -> &[Vec3] {
+    /// The welded corners that edges join to a welded corner.
+    pub(super) fn ends(&self, corner: u32) -> &[u32] {
         &self.ends[self.first[corner as usize] as usize..self.first[corner as usize + 1] as usize]
     }
 
@@ -146,18 +146,18 @@ impl Adjacency {
         }
     }
 
-    fn link_corners(&mut self, vertices: &[Vec3], sides: &[Side]) {
+    fn link_corners(&mut self, vertices: usize, sides: &[Side]) {
         let mut links: Vec<(u32, u32)> = sides.iter().flat_map(|s| [(s.0, s.1), (s.1, s.0)]).collect();
         links.sort_unstable();
         links.dedup();
-        self.first = vec![0; vertices.len() + 1];
+        self.first = vec![0; vertices + 1];
         for link in &links {
             self.first[link.0 as usize + 1] += 1;
         }
-        for i in 0..vertices.len() {
+        for i in 0..vertices {
             self.first[i + 1] += self.first[i];
         }
-        self.ends = links.iter().map(|link| vertices[link.1 as usize]).collect();
+        self.ends = links.iter().map(|link| link.1).collect();
     }
 }
 

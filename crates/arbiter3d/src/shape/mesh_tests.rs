@@ -139,7 +139,7 @@ fn edges_know_whether_they_bend() {
         assert!((mesh.neighborhood(i).inward[0] - expected).length() < 1e-6);
         assert_eq!(mesh.facet(i).sharp_edges & 1, u32::from(kind == MeshEdge::Convex));
         assert_eq!(mesh.facet(0).patch == mesh.facet(1).patch, kind == MeshEdge::Flat);
-        assert_eq!(mesh.corner_ends(0).len(), 3);
+        assert_eq!(mesh.corner_ends(0).count(), 3);
     }
 }
 
