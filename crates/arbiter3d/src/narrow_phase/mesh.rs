@@ -36,12 +36,12 @@ pub(crate) fn collide(
     let mut contact = Contact { mesh, pose, aabb, margin, manifold };
     match convex {
         // A sphere has no directions of its own: the mesh's axes serve, and face normals stay exact.
-        Shape::Sphere(sphere) => contact.gather(sphere, Mat3::IDENTITY),
-        Shape::Capsule(capsule) => contact.gather(capsule, pose.rotation.to_mat3()),
+        Shape::Sphere(sphere) => contact.gather(&mut { *sphere }, Mat3::IDENTITY),
+        Shape::Capsule(capsule) => contact.gather(&mut { *capsule }, pose.rotation.to_mat3()),
         Shape::Cuboid(cuboid) => {
-            contact.gather(&Solids::new(CuboidFeatures::new(cuboid).view()), pose.rotation.to_mat3());
+            contact.gather(&mut Solids::new(CuboidFeatures::new(cuboid).view()), pose.rotation.to_mat3());
         }
-        Shape::Hull(hull) => contact.gather(&Solids::new(Polyhedron::from_hull(hull)), pose.rotation.to_mat3()),
+        Shape::Hull(hull) => contact.gather(&mut Solids::new(Polyhedron::from_hull(hull)), pose.rotation.to_mat3()),
         Shape::Mesh(_) => {}
     }
 }
@@ -55,10 +55,10 @@ struct Contact<'a> {
 }
 
 impl Contact<'_> {
-    fn gather(&mut self, solid: &impl Solid, rotation: Mat3) {
+    fn gather(&mut self, solid: &mut impl Solid, rotation: Mat3) {
         let inner = solid.inner_radius();
         let scale = if self.margin > 0.0 { crate::math::min(self.margin, inner) } else { 0.02 * inner };
-        let frame = Frame { rotation, inverse: rotation.transpose(), position: self.pose.position };
+        let frame = Frame { rotation, inverse: rotation.transpose(), position: self.pose.position, scale };
         let mut reach = Reach { margin: self.margin, scale, second_look: false };
         let mut candidates = Candidates::new(0.02 * scale);
         let missing = self.touch_all(solid, &frame, &reach, &mut candidates);
@@ -70,9 +70,10 @@ impl Contact<'_> {
     }
 
     /// Adds the points of all triangles near the shape. Returns whether one might overlap that gave no point.
-    fn touch_all(&self, solid: &impl Solid, frame: &Frame, reach: &Reach, out: &mut Candidates) -> bool {
+    fn touch_all(&self, solid: &mut impl Solid, frame: &Frame, reach: &Reach, out: &mut Candidates) -> bool {
         let center = frame.position + frame.rotation * solid.center();
         let far = solid.outer_radius() + self.margin;
+        let bounds = solid.bounds().expand(self.margin);
         let mut missing = false;
         self.mesh.for_each_facet(&self.aabb, |index| {
             let facet = self.mesh.facet(index);
@@ -82,7 +83,9 @@ impl Contact<'_> {
                 return;
             }
             let side = if front { 1.0 } else { -1.0 };
-            missing |= solid.touch(&Triangle::new(self.mesh, frame, index, side, reach.scale), reach, out);
+            if let Some(triangle) = Triangle::new(self.mesh, frame, index, side, &bounds) {
+                missing |= solid.touch(&triangle, reach, out);
+            }
         });
         missing
     }

@@ -7,7 +7,7 @@
 //! the face beside it, with the plane's own distance, and never the edge: seams inside a surface are not felt.
 
 use super::mesh_points::{Candidate, Candidates, NO_FACET};
-use crate::math::{Mat3, Real, Vec3, clamp};
+use crate::math::{Aabb, Mat3, Real, Vec3, abs3, clamp, max, max3, min, min3};
 use crate::shape::{Capsule, Facet, Sphere, TriangleMesh};
 
 /// Sine by which a normal may leave the range that an edge or a corner allows: rounding, not geometry.
@@ -25,6 +25,8 @@ pub(super) struct Frame {
     /// From the mesh's frame to the shape's.
     pub(super) inverse: Mat3,
     pub(super) position: Vec3,
+    /// As in [`Reach`].
+    pub(super) scale: Real,
 }
 
 /// How close is close.
@@ -57,17 +59,29 @@ pub(super) struct Triangle<'a> {
 }
 
 impl<'a> Triangle<'a> {
-    /// The triangle as seen from its front (`side` 1) or back (−1).
-    pub(super) fn new(mesh: &'a TriangleMesh, frame: &'a Frame, index: usize, side: Real, scale: Real) -> Self {
+    /// The triangle as seen from its front (`side` 1) or back (−1); `None` if it is outside the box, which is in the
+    /// frame of the shape.
+    pub(super) fn new(
+        mesh: &'a TriangleMesh,
+        frame: &'a Frame,
+        index: usize,
+        side: Real,
+        bounds: &Aabb,
+    ) -> Option<Self> {
         let facet = mesh.facet(index);
         let corners = facet.corners.map(|c| frame.inverse * (c - frame.position));
+        let (low, high) = (min3(corners[0], min3(corners[1], corners[2])), max3(corners[0], max3(corners[1], corners[2])));
+        if !bounds.overlaps(&Aabb::new(low, high)) {
+            return None;
+        }
         let front = frame.inverse * facet.normal;
         let inward = |i: usize| {
             let across = front.cross(corners[(i + 1) % 3] - corners[i]);
             across * (1.0 / across.length())
         };
-        let size = corners.iter().fold(0.0, |m, c| crate::math::max(m, c.abs().max_element()));
-        Self {
+        let extent = max3(abs3(low), abs3(high));
+        let size = max(extent.x, max(extent.y, extent.z));
+        Some(Self {
             mesh,
             frame,
             facet,
@@ -76,8 +90,8 @@ impl<'a> Triangle<'a> {
             normal: front * side,
             offset: facet.normal.dot(facet.corners[0] - frame.position) * side,
             inward: [inward(0), inward(1), inward(2)],
-            slack: 1e-3 * scale + 2e-7 * size,
-        }
+            slack: 1e-3 * frame.scale + 2e-7 * size,
+        })
     }
 
     /// Height of a point above the plane.
@@ -90,6 +104,13 @@ impl<'a> Triangle<'a> {
     #[inline(always)]
     pub(super) fn edge(&self, i: usize) -> (Vec3, Vec3) {
         (self.corners[i], self.corners[(i + 1) % 3])
+    }
+
+    /// Whether the surface goes on flat across an edge that cut something off: the neighbour has the rest, so where it
+    /// was cut is no end of the contact.
+    #[inline(always)]
+    pub(super) fn is_seam(&self, cut: u32) -> bool {
+        self.facet.flat_edges >> cut & 1 == 1
     }
 
     #[inline(always)]
@@ -196,9 +217,11 @@ pub(super) trait Solid {
     fn inner_radius(&self) -> Real;
     /// Radius of a ball about the centre around the shape.
     fn outer_radius(&self) -> Real;
+    /// The box around the shape in its frame.
+    fn bounds(&self) -> Aabb;
     /// Adds the points of one triangle. Returns whether the triangle might overlap the shape but gave no point, because it
     /// is the neighbours' matter: if they give none either, it is looked at again.
-    fn touch(&self, triangle: &Triangle, reach: &Reach, out: &mut Candidates) -> bool;
+    fn touch(&mut self, triangle: &Triangle, reach: &Reach, out: &mut Candidates) -> bool;
 }
 
 impl Solid for Sphere {
@@ -214,8 +237,12 @@ impl Solid for Sphere {
         self.radius()
     }
 
+    fn bounds(&self) -> Aabb {
+        self.local_aabb()
+    }
+
     /// The face if the centre is above it, else the nearest edge or corner if that is a summit.
-    fn touch(&self, triangle: &Triangle, reach: &Reach, out: &mut Candidates) -> bool {
+    fn touch(&mut self, triangle: &Triangle, reach: &Reach, out: &mut Candidates) -> bool {
         let height = triangle.height(Vec3::ZERO);
         if height - self.radius() > reach.margin {
             return false;
@@ -278,11 +305,15 @@ impl Solid for Capsule {
         self.radius() + self.half_length()
     }
 
+    fn bounds(&self) -> Aabb {
+        self.local_aabb()
+    }
+
     /// The ends of the part of the segment above the face, and the nearest points of the edges that are summits there.
-    fn touch(&self, triangle: &Triangle, reach: &Reach, out: &mut Candidates) -> bool {
+    fn touch(&mut self, triangle: &Triangle, reach: &Reach, out: &mut Candidates) -> bool {
         let end = Vec3::new(0.0, self.half_length(), 0.0);
         let (low, high) = (triangle.height(-end), triangle.height(end));
-        let lowest = crate::math::min(low, high);
+        let lowest = min(low, high);
         if lowest - self.radius() > reach.margin {
             return false;
         }
@@ -291,10 +322,11 @@ impl Solid for Capsule {
             let heights = ends.map(|t| low + (high - low) * t);
             // A segment that runs under the triangle without crossing it counts only while the capsule still reaches up
             // through the plane.
-            let crosses = crate::math::max(heights[0], heights[1]) >= -self.radius();
+            let crosses = max(heights[0], heights[1]) >= -self.radius();
             let count = if ends[1] - ends[0] > 1e-6 { 2 } else { 1 };
             for k in 0..count {
-                if crosses && heights[k] - self.radius() <= reach.margin {
+                if crosses && heights[k] - self.radius() <= reach.margin && (reach.second_look || !triangle.is_seam(cuts[k]))
+                {
                     let cut = 2 + (triangle.facet.id << 3 | cuts[k] << 1 | k as u32);
                     let feature = if cuts[k] == 3 { k as u32 } else { cut };
                     let point = end * (2.0 * ends[k] - 1.0);
@@ -395,7 +427,7 @@ pub(super) fn parallel_part(first: (Vec3, Vec3), second: (Vec3, Vec3)) -> Option
     let mut ts = [0.0, 1.0];
     let (t0, t1) = (d1.dot(second.0 - first.0) / a, d1.dot(second.1 - first.0) / a);
     let (low, high) = if t0 < t1 { (t0, t1) } else { (t1, t0) };
-    ts = [crate::math::max(ts[0], low), crate::math::min(ts[1], high)];
+    ts = [max(ts[0], low), min(ts[1], high)];
     if ts[1] - ts[0] <= 1e-3 {
         return None;
     }

@@ -15,7 +15,7 @@
 use super::mesh_points::{Candidate, Candidates};
 use super::polyhedron::Polyhedron;
 use super::triangle::{Reach, Solid, Triangle, feature_id, parallel_part};
-use crate::math::{Real, Vec3, clamp, max, min};
+use crate::math::{Aabb, Real, Vec3, clamp, max, min};
 
 /// An edge, or the face, of a triangle lies level with its highest corner below this sine.
 const LEVEL_SINE: Real = 0.02;
@@ -31,7 +31,18 @@ const BACKWARD: Real = -0.7;
 /// A cuboid or a hull with the ball around it.
 pub(super) struct Solids<'a> {
     features: Polyhedron<'a>,
+    bounds: Aabb,
     outer_radius: Real,
+    underside: Underside,
+}
+
+/// What of the solid is lowest over a triangle; the same for all triangles that face the same way.
+#[derive(Clone, Copy, Default)]
+struct Underside {
+    normal: Vec3,
+    corner: usize,
+    /// The face at that corner that lies flattest.
+    face: usize,
 }
 
 /// The axis of least overlap.
@@ -45,7 +56,8 @@ enum Axis {
 impl<'a> Solids<'a> {
     pub(super) fn new(features: Polyhedron<'a>) -> Self {
         let squared = features.vertices.iter().fold(0.0, |m, v| max(m, (*v - features.center).length_squared()));
-        Self { features, outer_radius: squared.sqrt() }
+        let bounds = Aabb::from_points(features.vertices.iter().copied());
+        Self { features, bounds, outer_radius: squared.sqrt(), underside: Underside::default() }
     }
 }
 
@@ -62,12 +74,19 @@ impl Solid for Solids<'_> {
         self.outer_radius
     }
 
-    fn touch(&self, triangle: &Triangle, reach: &Reach, out: &mut Candidates) -> bool {
-        let (lowest, height) = self.lowest(triangle);
+    fn bounds(&self) -> Aabb {
+        self.bounds
+    }
+
+    fn touch(&mut self, triangle: &Triangle, reach: &Reach, out: &mut Candidates) -> bool {
+        if self.underside.normal != triangle.normal {
+            self.underside = Underside::new(&self.features, triangle.normal);
+        }
+        let height = triangle.height(self.features.vertices[self.underside.corner]);
         if height > reach.margin {
             return false;
         }
-        let pair = Pair { solid: &self.features, triangle, reach, lowest, height };
+        let pair = Pair { solid: &self.features, triangle, reach, face: self.underside.face, height };
         let plain = triangle.facet.sharp_edges == 0 && triangle.facet.sharp_corners == 0;
         if plain && height >= -SHALLOW * self.features.inner_radius && !reach.second_look {
             return pair.touch_face(out) == 0 && height < 0.0;
@@ -90,17 +109,25 @@ impl Solid for Solids<'_> {
     }
 }
 
-impl Solids<'_> {
-    /// The corner nearest to (or deepest under) the plane of the triangle, and its height.
-    fn lowest(&self, triangle: &Triangle) -> (usize, Real) {
-        let mut best = (0, Real::MAX);
-        for (i, vertex) in self.features.vertices.iter().enumerate() {
-            let height = triangle.height(*vertex);
-            if height < best.1 {
-                best = (i, height);
+impl Underside {
+    fn new(solid: &Polyhedron, normal: Vec3) -> Self {
+        let mut lowest = (0, Real::MAX);
+        for (i, vertex) in solid.vertices.iter().enumerate() {
+            let height = normal.dot(*vertex);
+            if height < lowest.1 {
+                lowest = (i, height);
             }
         }
-        best
+        let mut flattest = (0, Real::MAX);
+        for edge in solid.edges {
+            if edge.origin as usize == lowest.0 {
+                let cosine = solid.planes[edge.face as usize].normal.dot(normal);
+                if cosine < flattest.1 {
+                    flattest = (edge.face as usize, cosine);
+                }
+            }
+        }
+        Self { normal, corner: lowest.0, face: flattest.0 }
     }
 }
 
@@ -109,8 +136,9 @@ struct Pair<'a> {
     solid: &'a Polyhedron<'a>,
     triangle: &'a Triangle<'a>,
     reach: &'a Reach,
-    lowest: usize,
-    /// Of the lowest corner over the triangle's plane.
+    /// The solid's lowest face.
+    face: usize,
+    /// Of the solid's lowest corner over the triangle's plane.
     height: Real,
 }
 
@@ -208,24 +236,10 @@ impl Pair<'_> {
         }
     }
 
-    /// The face of the solid at its lowest corner that lies flattest on the triangle.
-    fn incident_face(&self) -> usize {
-        let mut best = (0, Real::MAX);
-        for edge in self.solid.edges {
-            if edge.origin as usize == self.lowest {
-                let cosine = self.solid.planes[edge.face as usize].normal.dot(self.triangle.normal);
-                if cosine < best.1 {
-                    best = (edge.face as usize, cosine);
-                }
-            }
-        }
-        best.0
-    }
-
     /// The solid's lowest face cut by the prism over the triangle, and the triangle's corners under that face.
     fn touch_face(&self, out: &mut Candidates) -> usize {
         let triangle = self.triangle;
-        let face = self.incident_face();
+        let (face, seams) = (self.face, !self.reach.second_look);
         let mut points = 0;
         let mut under = [true; 3];
         for edge in self.solid.face_loop(face) {
@@ -236,17 +250,21 @@ impl Pair<'_> {
                 *under &= inside.dot(*corner - a) > 0.0;
             }
             let Some((ends, cuts)) = triangle.clip(a, b) else { continue };
-            let start =
-                if cuts[0] == 3 { u32::from(self.solid.edges[edge].origin) } else { self.cut(edge, cuts[0], 0) };
-            points += self.face_point(a + (b - a) * ends[0], start, out);
-            if cuts[1] != 3 {
-                points += self.face_point(a + (b - a) * ends[1], self.cut(edge, cuts[1], 1), out);
+            if cuts[0] == 3 {
+                points += self.face_point(a, u32::from(self.solid.edges[edge].origin), out);
+            }
+            for k in 0..2 {
+                // Where a seam cuts is no end of the contact.
+                if cuts[k] != 3 && !(seams && triangle.is_seam(cuts[k])) {
+                    points += self.face_point(a + (b - a) * ends[k], self.cut(edge, cuts[k], k as u32), out);
+                }
             }
         }
         let plane = self.solid.planes[face];
         let slope = plane.normal.dot(triangle.normal);
         for (i, corner) in triangle.corners.iter().enumerate() {
-            if under[i] && slope < -0.01 {
+            let flat = seams && triangle.facet.flat_corners >> i & 1 == 1;
+            if under[i] && slope < -0.01 && !flat {
                 let gap = (plane.offset - plane.normal.dot(*corner)) / slope;
                 let feature = 512 + (triangle.facet.id << 2 | i as u32);
                 points += self.face_point(*corner + triangle.normal * gap, feature, out);

@@ -44,8 +44,10 @@ pub(super) struct Adjacency {
     pub(super) triangles: Vec<Neighborhood>,
     /// For each triangle the smallest number of those it is joined to by flat edges.
     pub(super) patches: Vec<u32>,
-    /// Bit `i`: a convex or open edge starts or ends in welded corner `i`.
+    /// For each welded corner whether a convex or open edge ends there.
     pub(super) sharp: Vec<bool>,
+    /// For each welded corner whether any edge that ends there is not flat.
+    pub(super) bent: Vec<bool>,
     first: Vec<u32>,
     ends: Vec<u32>,
 }
@@ -63,6 +65,7 @@ impl Adjacency {
                 .collect(),
             patches: (0..triangles.len() as u32).collect(),
             sharp: vec![false; vertices.len()],
+            bent: vec![false; vertices.len()],
             ..Self::default()
         };
         let sides = adjacency.sides();
@@ -119,9 +122,9 @@ impl Adjacency {
                 self.join_patches(side.2, other);
             }
         }
-        if matches!(kind, MeshEdge::Boundary | MeshEdge::Convex) {
-            self.sharp[side.0 as usize] = true;
-            self.sharp[side.1 as usize] = true;
+        for corner in [side.0 as usize, side.1 as usize] {
+            self.sharp[corner] |= matches!(kind, MeshEdge::Boundary | MeshEdge::Convex);
+            self.bent[corner] |= kind != MeshEdge::Flat;
         }
     }
 

@@ -137,7 +137,7 @@ fn edges_know_whether_they_bend() {
         assert_eq!(mesh.neighborhood(i).kinds, [kind, MeshEdge::Boundary, MeshEdge::Boundary]);
         let expected = Vec3::new(-1.0, height, 0.0).normalize();
         assert!((mesh.neighborhood(i).inward[0] - expected).length() < 1e-6);
-        assert_eq!(mesh.facet(i).sharp_edges & 1, u32::from(kind == MeshEdge::Convex));
+        assert_eq!(mesh.facet(i).sharp_edges & 1, u8::from(kind == MeshEdge::Convex));
         assert_eq!(mesh.facet(0).patch == mesh.facet(1).patch, kind == MeshEdge::Flat);
         assert_eq!(mesh.corner_ends(0).count(), 3);
     }
