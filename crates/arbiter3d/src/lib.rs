@@ -9,6 +9,6 @@ mod shape;
 
 pub use query::{Ray, ShapeHit, cast_ray};
 pub use shape::{
-    Capsule, ConvexHull, Cuboid, HalfEdge, MassProperties, MeshNode, MeshSides, Plane, Shape, ShapeError, Sphere,
-    TriangleMesh,
+    Capsule, ConvexHull, Cuboid, HalfEdge, MassProperties, MeshEdge, MeshNode, MeshRayHit, MeshSides, Plane, Shape,
+    ShapeError, Sphere, TriangleMesh,
 };
