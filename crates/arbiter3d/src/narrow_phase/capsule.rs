@@ -124,6 +124,9 @@ impl CapsulePair<'_> {
             }
             manifold.clear();
         }
+        if self.parallel_edge_contact(face, c, manifold) {
+            return;
+        }
         manifold.push(ManifoldPoint { point1: c.point1, normal: c.normal, separation, feature: 0 });
     }
 
@@ -204,6 +207,44 @@ impl CapsulePair<'_> {
             }
         }
         !manifold.points().is_empty()
+    }
+
+    /// The ends of the stretch of the segment along an edge of `face` that runs beside it and holds the closest point; false
+    /// if there is no such edge.
+    fn parallel_edge_contact(&self, face: usize, c: &Closest, manifold: &mut Manifold) -> bool {
+        let way = self.ends[1] - self.ends[0];
+        let squared = way.length_squared();
+        if c.normal.dot(way).abs() > PARALLEL_SINE * squared.sqrt() {
+            return false;
+        }
+        let nearness = FACE_LOSS * min(self.polyhedron.inner_radius, self.radius);
+        for edge in self.polyhedron.face_loop(face) {
+            let (a, b) = self.polyhedron.edge_points(edge);
+            let along = b - a;
+            let length_squared = along.length_squared();
+            let sine_squared = PARALLEL_SINE * PARALLEL_SINE * squared * length_squared;
+            let off = (c.point1 - a).cross(along).length_squared();
+            if along.cross(way).length_squared() > sine_squared || off > nearness * nearness * length_squared {
+                continue;
+            }
+            // Both as multiples of the edge.
+            let [p, q] = self.ends.map(|end| (end - a).dot(along) / length_squared);
+            let (low, high) = (max(min(p, q), 0.0), min(max(p, q), 1.0));
+            if high - low < 1e-2 {
+                continue;
+            }
+            for (end, s) in [(0, low), (1, high)] {
+                let point1 = a + along * s;
+                let core = self.ends[0] + way * clamp((s - p) / (q - p), 0.0, 1.0);
+                let separation = c.normal.dot(core - point1) - self.radius;
+                if separation <= self.margin {
+                    let feature = 0x1000_0000 | (edge as u32) << 1 | end;
+                    manifold.push(ManifoldPoint { point1, normal: c.normal, separation, feature });
+                }
+            }
+            return !manifold.points().is_empty();
+        }
+        false
     }
 
     /// Closest points of the segment and an edge of the polyhedron.

@@ -560,3 +560,22 @@ fn a_leaning_box_keeps_its_patch() {
         }
     }
 }
+
+#[test]
+fn a_capsule_beside_an_edge_touches_in_two_points() {
+    let cube = Shape::cuboid(Vec3::ONE).unwrap();
+    let capsule = Shape::capsule(0.5, 0.2).unwrap();
+    let lean = Rotation::from_xyzw(0.003, 0.0, 0.002, 1.0).normalize();
+    for a in [cube, box_hull(Vec3::ONE)] {
+        let m = contacts(&a, &capsule, &Pose::new(Vec3::new(1.12, 0.8, 1.12), lean), 0.02);
+        assert_eq!(m.points().len(), 2);
+        let separation = 0.12 * 2.0_f32.sqrt() - 0.2;
+        for p in m.points() {
+            assert!((p.separation - separation).abs() < 5e-3 && (p.normal.x - p.normal.z).abs() < 0.1);
+            assert!((p.point1.x - 1.0).abs() < 1e-5 && (p.point1.z - 1.0).abs() < 1e-5);
+        }
+        let mut ys = [m.points()[0].point1.y, m.points()[1].point1.y];
+        ys.sort_by(Real::total_cmp);
+        assert!((ys[0] - 0.3).abs() < 1e-3 && (ys[1] - 1.0).abs() < 1e-5, "{ys:?}");
+    }
+}
