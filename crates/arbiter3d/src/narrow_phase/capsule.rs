@@ -103,7 +103,7 @@ fn polyhedron_capsule(
         pair.outside_contact(&c, manifold);
         return;
     }
-    let size = min(polyhedron.inner_radius, pair.radius);
+    let size = min(polyhedron.size, pair.radius);
     match pair.best_edge(gap + EDGE_BIAS * size) {
         Some(edge) => pair.edge_contact(edge, manifold),
         None if pair.face_contact(face, manifold) => {}
@@ -118,7 +118,7 @@ impl CapsulePair<'_> {
         let face = self.polyhedron.face_along(c.normal);
         if self.polyhedron.planes[face].normal.dot(c.normal) > FACE_COSINE && self.face_contact(face, manifold) {
             // Beside an edge the stretch over the face can leave out the closest point.
-            let allowed = separation + FACE_LOSS * min(self.polyhedron.inner_radius, self.radius);
+            let allowed = separation + FACE_LOSS * min(self.polyhedron.size, self.radius);
             if manifold.points().iter().any(|p| p.separation <= allowed) {
                 return;
             }
@@ -217,7 +217,7 @@ impl CapsulePair<'_> {
         if c.normal.dot(way).abs() > PARALLEL_SINE * squared.sqrt() {
             return false;
         }
-        let nearness = FACE_LOSS * min(self.polyhedron.inner_radius, self.radius);
+        let nearness = FACE_LOSS * min(self.polyhedron.size, self.radius);
         for edge in self.polyhedron.face_loop(face) {
             let (a, b) = self.polyhedron.edge_points(edge);
             let along = b - a;

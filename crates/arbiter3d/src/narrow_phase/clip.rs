@@ -24,7 +24,8 @@ pub(crate) struct ClipPoint {
 /// Cuts the polygon by `normal · x <= offset`; `features` names the corners that the cut makes.
 ///
 /// `feature` of a corner made on the edge that leaves corner `c` is `(c.feature << 12) ^ cut`, with the top bit telling
-/// which way the edge crosses. Returns the new count; `output` needs room for one more corner than `input`.
+/// which way the edge crosses. Returns the new count; `output` needs room for one more corner than `input`: only a polygon that
+/// rounding has bent inwards could make more, and those are left out.
 pub(crate) fn clip_polygon(input: &[ClipPoint], plane: (Vec3, Real), cut: u32, output: &mut [ClipPoint]) -> usize {
     let Some(last) = input.last() else { return 0 };
     let mut count = 0;
@@ -32,7 +33,7 @@ pub(crate) fn clip_polygon(input: &[ClipPoint], plane: (Vec3, Real), cut: u32, o
     let mut previous_distance = plane.0.dot(previous.position) - plane.1;
     for &current in input {
         let distance = plane.0.dot(current.position) - plane.1;
-        if (previous_distance <= 0.0) != (distance <= 0.0) {
+        if (previous_distance <= 0.0) != (distance <= 0.0) && count < output.len() {
             let t = previous_distance / (previous_distance - distance);
             let direction = if distance <= 0.0 { 0x8000_0000 } else { 0 };
             output[count] = ClipPoint {
@@ -42,7 +43,7 @@ pub(crate) fn clip_polygon(input: &[ClipPoint], plane: (Vec3, Real), cut: u32, o
             };
             count += 1;
         }
-        if distance <= 0.0 {
+        if distance <= 0.0 && count < output.len() {
             output[count] = current;
             count += 1;
         }

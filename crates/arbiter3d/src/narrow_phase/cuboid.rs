@@ -21,15 +21,16 @@
 
 use super::clip::choose_four;
 use super::distance::{Support, closest};
+use super::polyhedron::cuboid_size;
 use super::{Manifold, ManifoldPoint, PairCache};
 use crate::math::{Mat3, Pose, Real, Vec3, clamp, max, min};
 use crate::shape::Cuboid;
 
-/// A face of box 2 is the reference when it is better by this share of the smallest half extent.
+/// A face of box 2 is the reference when it is better by this share of the smaller box's [`cuboid_size`].
 const FACE_BIAS: Real = 2e-3;
-/// An edge pair is looked at when it is better than the best face by this share of the smallest half extent.
+/// An edge pair is looked at when it is better than the best face by this share of the smaller box's [`cuboid_size`].
 const EDGE_GAIN: Real = 2e-4;
-/// Along a face normal, an edge pair makes the contact when the clipped face is deeper by this share of the smallest half extent.
+/// Along a face normal, an edge pair makes the contact when the clipped face is deeper by this share of the smaller box's [`cuboid_size`].
 pub(super) const EDGE_BIAS: Real = 5e-3;
 /// Cosine above which the axis of an edge pair is taken to be along a face normal (11°).
 pub(super) const ALIGNED: Real = 0.98;
@@ -69,7 +70,7 @@ pub(crate) fn cuboid_cuboid(
     if (1..=15).contains(&cached) && boxes.gap(cached - 1) > margin {
         return;
     }
-    let size = min(cuboid1.half_extents().min_element(), cuboid2.half_extents().min_element());
+    let size = min(cuboid_size(cuboid1.half_extents()), cuboid_size(cuboid2.half_extents()));
     let face = boxes.best_face(margin, size);
     cache.words[0] = face.axis as u32 + 1;
     if face.gap > margin {

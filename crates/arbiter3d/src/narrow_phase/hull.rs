@@ -14,7 +14,7 @@
 //! `n · (m − v)` is at most the larger of the values at its ends, over the cosine of half the arc where that is positive. What
 //! cannot beat the best gap so far is skipped; in round hulls this leaves the few features next to the contact.
 //!
-//! Faces and edges are weighed against each other as in the cuboid kernel, with the inner radius as the size of a hull.
+//! Faces and edges are weighed against each other as in the cuboid kernel, with [`tolerance_size`](super::polyhedron::tolerance_size) of the inner radius.
 //!
 //! The cache holds the last axis. It only ends the search early, when the hulls are still apart along it.
 
@@ -26,11 +26,11 @@ use super::{Manifold, ManifoldPoint, PairCache};
 use crate::math::{Mat3, Pose, Real, Vec3, clamp, max, min, normalize_or};
 use crate::shape::{ConvexHull, Cuboid, HalfEdge};
 
-/// A face of hull 2 is the reference when it is better by this share of the smaller inner radius.
+/// A face of hull 2 is the reference when it is better by this share of the smaller size.
 const FACE_BIAS: Real = 2e-3;
-/// An edge pair is looked at when it is better than the best face by this share of the smaller inner radius.
+/// An edge pair is looked at when it is better than the best face by this share of the smaller size.
 const EDGE_GAIN: Real = 2e-4;
-/// Share of the smaller inner radius by which side planes are moved out, so that corners on the border stay corners.
+/// Share of the smaller size by which side planes are moved out, so that corners on the border stay corners.
 const GROWTH: Real = 1e-4;
 /// Edges with `sin²` of their angle below this are parallel: faces stand in for them.
 const PARALLEL: Real = 1e-5;
@@ -146,7 +146,7 @@ impl HullPair<'_> {
         if self.cached_gap(cache.words[0], &view1, &view2) > self.margin {
             return;
         }
-        let size = min(self.polyhedron1.inner_radius, self.polyhedron2.inner_radius);
+        let size = min(self.polyhedron1.size, self.polyhedron2.size);
         view1.measure_heights();
         view2.measure_heights();
         let face = self.best_face(&view1, &view2, size);
