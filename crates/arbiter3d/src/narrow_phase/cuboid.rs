@@ -82,17 +82,15 @@ pub(crate) fn cuboid_cuboid(
         if edge.gap > margin {
             return;
         }
-        if boxes.cosine(edge.axis - 6, face.axis) < ALIGNED {
-            boxes.edge_contact(edge.axis - 6, manifold);
-            return;
+        if boxes.cosine(edge.axis - 6, face.axis) > ALIGNED {
+            boxes.face_contact(face.axis, &m, (margin, size), manifold);
         }
-    }
-    boxes.face_contact(face.axis, &m, (margin, size), manifold);
-    if let Some(edge) = edge
-        && !stands_in(manifold, edge.gap - EDGE_BIAS * size)
-    {
-        manifold.clear();
-        boxes.edge_contact(edge.axis - 6, manifold);
+        if !stands_in(manifold, edge.gap - EDGE_BIAS * size) {
+            manifold.clear();
+            boxes.edge_contact(edge.axis - 6, manifold);
+        }
+    } else {
+        boxes.face_contact(face.axis, &m, (margin, size), manifold);
     }
     if manifold.points().is_empty() {
         passing_by(cuboid1, cuboid2, pose, (margin, face.gap, face.axis), manifold);
@@ -276,7 +274,7 @@ impl Boxes {
         }
     }
 
-    /// The closest points of one edge of each box.
+    /// The closest points of one edge of each box; nothing if the boxes are apart and the edges are closest beyond their ends.
     fn edge_contact(&self, pair: usize, manifold: &mut Manifold) {
         let (i, j) = (pair / 3, pair % 3);
         let column = |k: usize| Vec3::new(self.c[0][k], self.c[1][k], self.c[2][k]);
@@ -299,8 +297,14 @@ impl Boxes {
         let w = p2 - p1;
         let cosine = self.c[i][j];
         let (along1, along2) = (w[i], w.dot(d2));
-        let s = clamp((along1 - cosine * along2) / self.edge_length_squared(i, j), -self.a[i], self.a[i]);
-        manifold.push(ManifoldPoint { point1: p1 + d1 * s, normal, separation: w.dot(normal), feature });
+        let squared = self.edge_length_squared(i, j);
+        let (s, t) = ((along1 - cosine * along2) / squared, (cosine * along1 - along2) / squared);
+        let separation = w.dot(normal);
+        if separation > 0.0 && (s.abs() > self.a[i] || t.abs() > self.b[j]) {
+            return;
+        }
+        let point1 = p1 + d1 * clamp(s, -self.a[i], self.a[i]);
+        manifold.push(ManifoldPoint { point1, normal, separation, feature });
     }
 }
 

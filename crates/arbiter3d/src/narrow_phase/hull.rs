@@ -160,17 +160,15 @@ impl HullPair<'_> {
             if edges.gap > self.margin {
                 return;
             }
-            if !self.is_aligned(edges, face, &m) {
-                self.edge_contact(edges, &m, manifold);
-                return;
+            if self.is_aligned(edges, face, &m) {
+                self.face_contact(face, (&view1, &view2), size, manifold);
             }
-        }
-        self.face_contact(face, (&view1, &view2), size, manifold);
-        if let Some(edges) = edges
-            && !stands_in(manifold, edges.gap - EDGE_BIAS * size)
-        {
-            manifold.clear();
-            self.edge_contact(edges, &m, manifold);
+            if !stands_in(manifold, edges.gap - EDGE_BIAS * size) {
+                manifold.clear();
+                self.edge_contact(edges, &m, manifold);
+            }
+        } else {
+            self.face_contact(face, (&view1, &view2), size, manifold);
         }
         if manifold.points().is_empty() {
             self.passing_by(face, &view1, &view2, manifold);
@@ -264,7 +262,7 @@ impl HullPair<'_> {
         (best.code != 0).then_some(best)
     }
 
-    /// Closest points of the two edges.
+    /// Closest points of the two edges; nothing if the hulls are apart and the edges are closest beyond their ends.
     fn edge_contact(&self, edges: Axis, m: &Mat3, manifold: &mut Manifold) {
         let (e1, e2) = edges.edges();
         let edge1 = Edge::new(&self.polyhedron1, e1);
@@ -272,7 +270,12 @@ impl HullPair<'_> {
         let Some((separation, normal)) = edge1.gap(&edge2) else { return };
         let (d1, d2, w) = (edge1.along, edge2.along, edge2.start - edge1.start);
         let (a11, a12, a22) = (d1.dot(d1), d1.dot(d2), d2.dot(d2));
-        let s = (w.dot(d1) * a22 - w.dot(d2) * a12) / (a11 * a22 - a12 * a12);
+        let determinant = a11 * a22 - a12 * a12;
+        let s = (w.dot(d1) * a22 - w.dot(d2) * a12) / determinant;
+        let t = (w.dot(d1) * a12 - w.dot(d2) * a11) / determinant;
+        if separation > 0.0 && !((0.0..=1.0).contains(&s) && (0.0..=1.0).contains(&t)) {
+            return;
+        }
         let point1 = edge1.start + d1 * clamp(s, 0.0, 1.0);
         let feature = 0x8000_0000 | edges.index() as u32;
         manifold.push(ManifoldPoint { point1, normal, separation, feature });

@@ -619,3 +619,26 @@ fn nonsense_does_not_panic() {
         }
     }
 }
+
+/// Boxes and hulls that are apart, against the distance that GJK finds: where edges or corners are closest, the one point is
+/// theirs, and none is told for shapes that only pass each other.
+#[test]
+fn shapes_apart_tell_their_distance() {
+    use super::distance::{Support, closest};
+    let mut random = Random(0x4444_3333_2222_1111);
+    let all = &shapes()[..4];
+    let (mut apart, mut lost, mut early, mut late) = (0, 0, 0, 0);
+    for _ in 0..20_000 {
+        let (a, b) = (&all[random.0 as usize % 3], &all[random.0 as usize / 7 % 3]);
+        let pose = Pose::new(random.direction() * random.between(0.5, 1.3), random.rotation());
+        let Some(c) = closest(&Support::new(a).unwrap(), &Support::new(b).unwrap(), &pose) else { continue };
+        let m = contacts(a, b, &pose, 0.1);
+        if c.distance < 0.1 {
+            apart += 1;
+            lost += m.points().is_empty() as u32;
+            late += (!m.points().is_empty() && lowest(&m) > c.distance + 0.02) as u32;
+            early += (!m.points().is_empty() && lowest(&m) < c.distance - 0.02) as u32;
+        }
+    }
+    assert!(apart > 1000 && lost == 0 && early * 50 < apart && late * 50 < apart, "{apart} {lost} {early} {late}");
+}
