@@ -82,15 +82,15 @@ pub(crate) fn cuboid_cuboid(
         if edge.gap > margin {
             return;
         }
-        if boxes.cosine(edge.axis - 6, face.axis) > ALIGNED {
-            boxes.face_contact(face.axis, &m, (margin, size), manifold);
-        }
-        if !stands_in(manifold, edge.gap - EDGE_BIAS * size) {
-            manifold.clear();
-            boxes.edge_contact(edge.axis - 6, manifold);
-        }
-    } else {
+    }
+    if edge.is_none_or(|edge| boxes.cosine(edge.axis - 6, face.axis) > ALIGNED) {
         boxes.face_contact(face.axis, &m, (margin, size), manifold);
+    }
+    if let Some(edge) = edge
+        && !stands_in(manifold, edge.gap - EDGE_BIAS * size)
+    {
+        manifold.clear();
+        boxes.edge_contact(edge.axis - 6, manifold);
     }
     if manifold.points().is_empty() {
         passing_by(cuboid1, cuboid2, pose, (margin, face.gap, face.axis), manifold);

@@ -160,15 +160,15 @@ impl HullPair<'_> {
             if edges.gap > self.margin {
                 return;
             }
-            if self.is_aligned(edges, face, &m) {
-                self.face_contact(face, (&view1, &view2), size, manifold);
-            }
-            if !stands_in(manifold, edges.gap - EDGE_BIAS * size) {
-                manifold.clear();
-                self.edge_contact(edges, &m, manifold);
-            }
-        } else {
+        }
+        if edges.is_none_or(|edges| self.is_aligned(edges, face, &m)) {
             self.face_contact(face, (&view1, &view2), size, manifold);
+        }
+        if let Some(edges) = edges
+            && !stands_in(manifold, edges.gap - EDGE_BIAS * size)
+        {
+            manifold.clear();
+            self.edge_contact(edges, &m, manifold);
         }
         if manifold.points().is_empty() {
             self.passing_by(face, &view1, &view2, manifold);
