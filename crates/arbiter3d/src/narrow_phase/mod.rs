@@ -14,15 +14,19 @@
 mod capsule;
 mod clip;
 mod cuboid;
-#[cfg_attr(not(test), expect(dead_code, reason = "sweeps and meshes use the rest of it"))]
 mod distance;
 mod hull;
 mod manifold;
 mod mesh;
+mod mesh_points;
 mod polyhedron;
 mod sphere;
-#[cfg_attr(not(test), expect(dead_code, reason = "the continuous phase calls it"))]
 mod time_of_impact;
+mod triangle;
+mod triangle_solid;
+
+pub(crate) use distance::Support;
+pub(crate) use time_of_impact::{Sweep, time_of_impact};
 
 pub use manifold::{Manifold, ManifoldPoint};
 

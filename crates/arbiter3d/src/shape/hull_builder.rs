@@ -7,10 +7,10 @@
 //! to the new ones.
 //!
 //! What usually breaks a quickhull is a rounded visibility test: the horizon stops being one simple loop. Here the
-//! test is exact. The points are first snapped to a lattice of 2^30 steps along their largest extent (about a hundred
-//! times finer than the tolerance below), so that a triangle's normal fits an `i64` and its product with a point an
-//! `i128`. A triangle is removed only if the point is strictly in front of its plane, and hence the visible triangles
-//! of a convex hull are one disk, the horizon is one simple loop, and no new triangle has zero area.
+//! test is exact. The points are first snapped to a lattice of 2^29 or more steps along their largest extent (about a
+//! hundred times finer than the tolerance below), so that a triangle's normal fits an `i64` and its product with a
+//! point an `i128`. A triangle is removed only if the point is strictly in front of its plane, and hence the visible
+//! triangles of a convex hull are one disk, the horizon is one simple loop, and no new triangle has zero area.
 //!
 //! Tolerances decide only *which* points are worth adding: those more than `3 ε (|x|max + |y|max + |z|max)` in front
 //! of a triangle, about the rounding that the coordinates of a point on a face have seen already. As a hull vertex is

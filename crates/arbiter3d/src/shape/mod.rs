@@ -10,13 +10,16 @@ mod hull_builder;
 mod hull_merge;
 mod mass;
 mod mesh;
+mod mesh_edges;
+mod mesh_tree;
 mod sphere;
 
 pub use capsule::Capsule;
 pub use cuboid::Cuboid;
 pub use hull::{ConvexHull, HalfEdge, Plane};
 pub use mass::MassProperties;
-pub use mesh::{MeshNode, MeshSides, TriangleMesh};
+pub(crate) use mesh::Facet;
+pub use mesh::{MeshEdge, MeshNode, MeshRayHit, MeshSides, TriangleMesh};
 pub use sphere::Sphere;
 
 use crate::math::{Aabb, Pose, Real, Vec3};
