@@ -1,11 +1,11 @@
 //! Capsules against capsules, cuboids and hulls.
 //!
-//! Two capsules meet where their segments are closest (Ericson, "Real-Time Collision Detection", 2005, section 5.1.9). Near
-//! parallel, the two ends of the stretch that they share carry the contact.
+//! Two capsules meet where their segments are closest (Ericson, "Real-Time Collision Detection", 2005, section 5.1.9).
+//! Near parallel, the two ends of the stretch that they share carry the contact.
 //!
-//! Against a polyhedron, the closest points of the segment give the normal while the segment is outside; inside, the faces and
-//! the cross products of its edges with the segment are tried for the direction of least overlap. If the normal is (nearly) that of a
-//! face, the stretch of the segment over that face gives two points.
+//! Against a polyhedron, the closest points of the segment give the normal while the segment is outside; inside, the
+//! faces and the cross products of its edges with the segment are tried for the direction of least overlap. If the
+//! normal is (nearly) that of a face, the stretch of the segment over that face gives two points.
 
 use super::distance::{Closest, Support, closest};
 use super::polyhedron::{CuboidFeatures, Polyhedron};
@@ -144,7 +144,8 @@ impl CapsulePair<'_> {
 
     /// The edge whose cross product with the segment has the largest gap, if that is above `floor`, and its normal.
     ///
-    /// Only where the segment's directions cross the arc between the normals of the two faces can the product be a support.
+    /// Only where the segment's directions cross the arc between the normals of the two faces can the product be a
+    /// support.
     fn best_edge(&self, floor: Real) -> Option<(usize, Vec3)> {
         let direction = self.ends[1] - self.ends[0];
         let mut best = floor;
@@ -209,8 +210,8 @@ impl CapsulePair<'_> {
         !manifold.points().is_empty()
     }
 
-    /// The ends of the stretch of the segment along an edge of `face` that runs beside it and holds the closest point; false
-    /// if there is no such edge.
+    /// The ends of the stretch of the segment along an edge of `face` that runs beside it and holds the closest point;
+    /// false if there is no such edge.
     fn parallel_edge_contact(&self, face: usize, c: &Closest, manifold: &mut Manifold) -> bool {
         let way = self.ends[1] - self.ends[0];
         let squared = way.length_squared();

@@ -1,20 +1,22 @@
 //! Convex hulls against hulls and cuboids: separating axes from faces and edge pairs, then a clipped face.
 //!
-//! For a face of one hull the gap is that of its plane to the lowest corner of the other hull. A pair of edges gives a candidate
-//! only where it makes a face of the Minkowski difference: where the arcs that join the normals of their faces cross on the
-//! unit sphere (Gregorius, "The Separating Axis Test between Convex Polyhedra", GDC 2013). With edge directions `e1`, `e2`,
-//! face normals `a`, `b` left and right of `e1`, and `c`, `d` of `e2`, they cross when
+//! For a face of one hull the gap is that of its plane to the lowest corner of the other hull. A pair of edges gives a
+//! candidate only where it makes a face of the Minkowski difference: where the arcs that join the normals of their
+//! faces cross on the unit sphere (Gregorius, "The Separating Axis Test between Convex Polyhedra", GDC 2013). With
+//! edge directions `e1`, `e2`, face normals `a`, `b` left and right of `e1`, and `c`, `d` of `e2`, they cross when
 //!
 //! ```text
 //! (c · e1)(d · e1) < 0,   (a · e2)(b · e2) < 0,   (c · e1)(b · e2) < 0
 //! ```
 //!
-//! Most candidates are never looked at. The other hull holds a ball of radius `r` about its centre `m`, so the gap along a unit
-//! normal `n` that supports this hull at `v` is at most `n · (m − v) − r`. For an edge, `n` is on the arc between two normals, and
-//! `n · (m − v)` is at most the larger of the values at its ends, over the cosine of half the arc where that is positive. What
-//! cannot beat the best gap so far is skipped; in round hulls this leaves the few features next to the contact.
+//! Most candidates are never looked at. The other hull holds a ball of radius `r` about its centre `m`, so the gap
+//! along a unit normal `n` that supports this hull at `v` is at most `n · (m − v) − r`. For an edge, `n` is on the arc
+//! between two normals, and `n · (m − v)` is at most the larger of the values at its ends, over the cosine of half the
+//! arc where that is positive. What cannot beat the best gap so far is skipped; in round hulls this leaves the few
+//! features next to the contact.
 //!
-//! Faces and edges are weighed against each other as in the cuboid kernel, with [`tolerance_size`](super::polyhedron::tolerance_size) of the inner radius.
+//! Faces and edges are weighed against each other as in the cuboid kernel, with
+//! [`tolerance_size`](super::polyhedron::tolerance_size) of the inner radius.
 //!
 //! The cache holds the last axis. It only ends the search early, when the hulls are still apart along it.
 
@@ -449,7 +451,8 @@ impl<'a> View<'a> {
             // `highest / cos(half the arc) < limit`, with `cos² = (1 + left · right) / 2`, both sides positive.
             let cosine_squared = 0.5 * (1.0 + planes[left].normal.dot(planes[right].normal));
             let rises = (highest > 0.0) & (highest * highest >= limit * limit * cosine_squared);
-            // Written always, counted if it may matter: whether it does is hard to foretell. There is room for all edges.
+            // Written always, counted if it may matter: whether it does is hard to foretell. There is room for all
+            // edges.
             list[count.min(MAX_EDGES - 1)] = 2 * pair as u16;
             count += ((highest >= limit) | rises) as usize;
         }

@@ -1,8 +1,8 @@
 //! One view of cuboids and hulls for the kernels that work on faces, edges and corners.
 //!
 //! A cuboid has the topology of a hull that never changes; only its eight corners and six offsets are filled in.
-//! Corner `i` of a cuboid has `x > 0` if bit 0 of `i` is set, `y > 0` for bit 1, `z > 0` for bit 2. Face `2k` looks down
-//! axis `k`, face `2k + 1` up.
+//! Corner `i` of a cuboid has `x > 0` if bit 0 of `i` is set, `y > 0` for bit 1, `z > 0` for bit 2. Face `2k` looks
+//! down axis `k`, face `2k + 1` up.
 
 use crate::math::{Real, Vec3, abs3, max};
 use crate::shape::{ConvexHull, Cuboid, HalfEdge, Plane};
@@ -61,8 +61,8 @@ const fn find(ids: &[[u16; 4]; 6], faces: usize, a: u8, b: u8) -> u16 {
     u16::MAX
 }
 
-/// The length that tolerances of a shape are relative to: half its thickness, but for a sheet, whose thickness would put
-/// them below the rounding of its other coordinates, a fiftieth of half its length.
+/// The length that tolerances of a shape are relative to: half its thickness, but for a sheet, whose thickness would
+/// put them below the rounding of its other coordinates, a fiftieth of half its length.
 #[inline(always)]
 pub(crate) fn tolerance_size(half_thickness: Real, half_length: Real) -> Real {
     max(half_thickness, 0.02 * half_length)

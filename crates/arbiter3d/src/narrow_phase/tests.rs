@@ -120,7 +120,8 @@ fn boxes_agree_with_the_separating_axes_in_double_precision() {
         let gap = box_gap(d1, d2, &rot, dt, n.as_dvec3()) as Real;
         assert!(n.dot(t) >= 0.0);
         if oracle <= 0.0 {
-            // The best axis but for the preference for faces: never deeper by more than that, never along a made-up axis.
+            // The best axis but for the preference for faces: never deeper by more than that, never along a made-up
+            // axis.
             assert!(gap <= oracle + 1e-4 * size && lowest(&m) >= oracle - 8e-3 * size, "{gap} {oracle} {size}");
             lifted += (lowest(&m) > 0.0) as u32;
         }
@@ -523,7 +524,8 @@ fn features_do_not_flicker_in_a_resting_stack() {
     }
 }
 
-/// Two boxes on their edges, crossed: however little they overlap, the normal is square to both edges, not that of a face 45° off.
+/// Two boxes on their edges, crossed: however little they overlap, the normal is square to both edges, not that of a
+/// face 45° off.
 #[test]
 fn crossed_edges_push_square_to_both() {
     let cube = Shape::cuboid(Vec3::splat(0.5)).unwrap();
@@ -620,8 +622,8 @@ fn nonsense_does_not_panic() {
     }
 }
 
-/// Boxes and hulls that are apart, against the distance that GJK finds: where edges or corners are closest, the one point is
-/// theirs, and none is told for shapes that only pass each other.
+/// Boxes and hulls that are apart, against the distance that GJK finds: where edges or corners are closest, the one
+/// point is theirs, and none is told for shapes that only pass each other.
 #[test]
 fn shapes_apart_tell_their_distance() {
     use super::distance::{Support, closest};
