@@ -70,8 +70,7 @@ impl<'a> Triangle<'a> {
     ) -> Option<Self> {
         let facet = mesh.facet(index);
         let corners = facet.corners.map(|c| frame.inverse * (c - frame.position));
-        let (low, high) =
-            (min3(corners[0], min3(corners[1], corners[2])), max3(corners[0], max3(corners[1], corners[2])));
+        let (low, high) = (min3(corners[0], min3(corners[1], corners[2])), max3(corners[0], max3(corners[1], corners[2])));
         if !bounds.overlaps(&Aabb::new(low, high)) {
             return None;
         }
@@ -326,9 +325,7 @@ impl Solid for Capsule {
             let crosses = max(heights[0], heights[1]) >= -self.radius();
             let count = if ends[1] - ends[0] > 1e-6 { 2 } else { 1 };
             for k in 0..count {
-                if crosses
-                    && heights[k] - self.radius() <= reach.margin
-                    && (reach.second_look || !triangle.is_seam(cuts[k]))
+                if crosses && heights[k] - self.radius() <= reach.margin && (reach.second_look || !triangle.is_seam(cuts[k]))
                 {
                     let cut = 2 + (triangle.facet.id << 3 | cuts[k] << 1 | k as u32);
                     let feature = if cuts[k] == 3 { k as u32 } else { cut };
