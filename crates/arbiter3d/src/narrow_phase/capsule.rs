@@ -1,11 +1,11 @@
 //! Capsules against capsules, cuboids and hulls.
 //!
-//! Two capsules meet where their segments are closest (Ericson, "Real-Time Collision Detection", 2005, section 5.1.9). Near
-//! parallel, the two ends of the stretch that they share carry the contact.
+//! Two capsules meet where their segments are closest (Ericson, "Real-Time Collision Detection", 2005, section 5.1.9).
+//! Near parallel, the two ends of the stretch that they share carry the contact.
 //!
-//! Against a polyhedron, the closest points of the segment give the normal while the segment is outside; inside, the faces and
-//! the cross products of its edges with the segment are tried for the direction of least overlap. If the normal is (nearly) that of a
-//! face, the stretch of the segment over that face gives two points.
+//! Against a polyhedron, the closest points of the segment give the normal while the segment is outside; inside, the
+//! faces and the cross products of its edges with the segment are tried for the direction of least overlap. If the
+//! normal is (nearly) that of a face, the stretch of the segment over that face gives two points.
 
 use super::distance::{Closest, Support, closest};
 use super::polyhedron::{CuboidFeatures, Polyhedron};
@@ -103,7 +103,7 @@ fn polyhedron_capsule(
         pair.outside_contact(&c, manifold);
         return;
     }
-    let size = min(polyhedron.inner_radius, pair.radius);
+    let size = min(polyhedron.size, pair.radius);
     match pair.best_edge(gap + EDGE_BIAS * size) {
         Some(edge) => pair.edge_contact(edge, manifold),
         None if pair.face_contact(face, manifold) => {}
@@ -118,11 +118,14 @@ impl CapsulePair<'_> {
         let face = self.polyhedron.face_along(c.normal);
         if self.polyhedron.planes[face].normal.dot(c.normal) > FACE_COSINE && self.face_contact(face, manifold) {
             // Beside an edge the stretch over the face can leave out the closest point.
-            let allowed = separation + FACE_LOSS * min(self.polyhedron.inner_radius, self.radius);
+            let allowed = separation + FACE_LOSS * min(self.polyhedron.size, self.radius);
             if manifold.points().iter().any(|p| p.separation <= allowed) {
                 return;
             }
             manifold.clear();
+        }
+        if self.parallel_edge_contact(face, c, manifold) {
+            return;
         }
         manifold.push(ManifoldPoint { point1: c.point1, normal: c.normal, separation, feature: 0 });
     }
@@ -141,7 +144,8 @@ impl CapsulePair<'_> {
 
     /// The edge whose cross product with the segment has the largest gap, if that is above `floor`, and its normal.
     ///
-    /// Only where the segment's directions cross the arc between the normals of the two faces can the product be a support.
+    /// Only where the segment's directions cross the arc between the normals of the two faces can the product be a
+    /// support.
     fn best_edge(&self, floor: Real) -> Option<(usize, Vec3)> {
         let direction = self.ends[1] - self.ends[0];
         let mut best = floor;
@@ -204,6 +208,44 @@ impl CapsulePair<'_> {
             }
         }
         !manifold.points().is_empty()
+    }
+
+    /// The ends of the stretch of the segment along an edge of `face` that runs beside it and holds the closest point;
+    /// false if there is no such edge.
+    fn parallel_edge_contact(&self, face: usize, c: &Closest, manifold: &mut Manifold) -> bool {
+        let way = self.ends[1] - self.ends[0];
+        let squared = way.length_squared();
+        if c.normal.dot(way).abs() > PARALLEL_SINE * squared.sqrt() {
+            return false;
+        }
+        let nearness = FACE_LOSS * min(self.polyhedron.size, self.radius);
+        for edge in self.polyhedron.face_loop(face) {
+            let (a, b) = self.polyhedron.edge_points(edge);
+            let along = b - a;
+            let length_squared = along.length_squared();
+            let sine_squared = PARALLEL_SINE * PARALLEL_SINE * squared * length_squared;
+            let off = (c.point1 - a).cross(along).length_squared();
+            if along.cross(way).length_squared() > sine_squared || off > nearness * nearness * length_squared {
+                continue;
+            }
+            // Both as multiples of the edge.
+            let [p, q] = self.ends.map(|end| (end - a).dot(along) / length_squared);
+            let (low, high) = (max(min(p, q), 0.0), min(max(p, q), 1.0));
+            if high - low < 1e-2 {
+                continue;
+            }
+            for (end, s) in [(0, low), (1, high)] {
+                let point1 = a + along * s;
+                let core = self.ends[0] + way * clamp((s - p) / (q - p), 0.0, 1.0);
+                let separation = c.normal.dot(core - point1) - self.radius;
+                if separation <= self.margin {
+                    let feature = 0x1000_0000 | (edge as u32) << 1 | end;
+                    manifold.push(ManifoldPoint { point1, normal: c.normal, separation, feature });
+                }
+            }
+            return !manifold.points().is_empty();
+        }
+        false
     }
 
     /// Closest points of the segment and an edge of the polyhedron.

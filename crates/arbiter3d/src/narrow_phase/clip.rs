@@ -1,9 +1,10 @@
 //! Clipping of a face against the side planes of another, and the choice of the four points that carry a contact best.
 //!
-//! Clipping is Sutherland and Hodgman's ("Reentrant polygon clipping", 1974): each plane cuts the polygon into one with at most
-//! one more corner. The choice keeps the deepest point, then adds the one farthest from it, the one that makes the largest
-//! triangle and the one that adds most area to it. Equal candidates go to the lowest index, and a candidate must win by a
-//! relative [`TIE`], so that rounding does not make a resting contact jump from one equal choice to the next.
+//! Clipping is Sutherland and Hodgman's ("Reentrant polygon clipping", 1974): each plane cuts the polygon into one
+//! with at most one more corner. The choice keeps the deepest point, then adds the one farthest from it, the one that
+//! makes the largest triangle and the one that adds most area to it. Equal candidates go to the lowest index, and a
+//! candidate must win by a relative [`TIE`], so that rounding does not make a resting contact jump from one equal
+//! choice to the next.
 
 use crate::math::{Real, Vec3, max, min, tangents};
 
@@ -24,7 +25,8 @@ pub(crate) struct ClipPoint {
 /// Cuts the polygon by `normal · x <= offset`; `features` names the corners that the cut makes.
 ///
 /// `feature` of a corner made on the edge that leaves corner `c` is `(c.feature << 12) ^ cut`, with the top bit telling
-/// which way the edge crosses. Returns the new count; `output` needs room for one more corner than `input`.
+/// which way the edge crosses. Returns the new count; `output` needs room for one more corner than `input`: only a
+/// polygon that rounding has bent inwards could make more, and those are left out.
 pub(crate) fn clip_polygon(input: &[ClipPoint], plane: (Vec3, Real), cut: u32, output: &mut [ClipPoint]) -> usize {
     let Some(last) = input.last() else { return 0 };
     let mut count = 0;
@@ -32,7 +34,7 @@ pub(crate) fn clip_polygon(input: &[ClipPoint], plane: (Vec3, Real), cut: u32, o
     let mut previous_distance = plane.0.dot(previous.position) - plane.1;
     for &current in input {
         let distance = plane.0.dot(current.position) - plane.1;
-        if (previous_distance <= 0.0) != (distance <= 0.0) {
+        if (previous_distance <= 0.0) != (distance <= 0.0) && count < output.len() {
             let t = previous_distance / (previous_distance - distance);
             let direction = if distance <= 0.0 { 0x8000_0000 } else { 0 };
             output[count] = ClipPoint {
@@ -42,7 +44,7 @@ pub(crate) fn clip_polygon(input: &[ClipPoint], plane: (Vec3, Real), cut: u32, o
             };
             count += 1;
         }
-        if distance <= 0.0 {
+        if distance <= 0.0 && count < output.len() {
             output[count] = current;
             count += 1;
         }
@@ -53,7 +55,8 @@ pub(crate) fn clip_polygon(input: &[ClipPoint], plane: (Vec3, Real), cut: u32, o
 
 /// Chooses at most four of the points (on a plane with `normal`): their indices and how many.
 ///
-/// `size` is a length of the shapes: points less deep than the deepest by under a ten thousandth of it count as deepest.
+/// `size` is a length of the shapes: points less deep than the deepest by under a ten thousandth of it count as
+/// deepest.
 #[inline(always)]
 pub(crate) fn reduce(points: &[ClipPoint], normal: Vec3, size: Real) -> ([usize; 4], usize) {
     if points.len() <= 4 {
@@ -85,7 +88,8 @@ pub(crate) fn choose_four(
     };
     let (pa, pb) = ((ax, ay), position(b));
     let c = best(count, |i| beyond(i, pa, pb).abs());
-    // Wind a, b, c so that what is inside is not beyond; a point outside adds the triangle over the side that it is beyond.
+    // Wind a, b, c so that what is inside is not beyond; a point outside adds the triangle over the side that it is
+    // beyond.
     let (pb, pc) = if beyond(c, pa, pb) < 0.0 { (pb, position(c)) } else { (position(c), pb) };
     let d = best(count, |i| max(max(beyond(i, pa, pb), beyond(i, pb, pc)), max(beyond(i, pc, pa), 0.0)));
     // Points that coincide give no length or area, and are found twice: drop them.

@@ -1,7 +1,7 @@
 //! Cuboid against cuboid: the separating axis test on its fifteen axes, then one face clipped against another.
 //!
-//! With the axes of box 2 as columns of `C` in the frame of box 1, `A = |C|`, centre distance `t` and half extents `a`, `b`,
-//! the signed gaps along the candidate axes are (Gottschalk, Lin, Manocha, "OBBTree", 1996)
+//! With the axes of box 2 as columns of `C` in the frame of box 1, `A = |C|`, centre distance `t` and half extents
+//! `a`, `b`, the signed gaps along the candidate axes are (Gottschalk, Lin, Manocha, "OBBTree", 1996)
 //!
 //! ```text
 //! face i of box 1   |t_i| − a_i − Σ_j A_ij b_j
@@ -9,27 +9,30 @@
 //! edges i × j       (|t · (e_i × c_j)| − reach of both) / √(1 − C_ij²)
 //! ```
 //!
-//! The largest gap tells the direction of least overlap. The choice must not change from step to step in a resting stack: faces of
-//! box 1 win over those of box 2 unless these are better by a share of the smaller box ([`FACE_BIAS`]). An edge pair whose axis is
-//! almost a face normal, as in every stack that leans by a hair, has to beat the face as clipped by [`EDGE_BIAS`], since the face
-//! gives up to four points and the edges only one. At other angles edges win at once: a face would push the wrong way.
+//! The largest gap tells the direction of least overlap. The choice must not change from step to step in a resting
+//! stack: faces of box 1 win over those of box 2 unless these are better by a share of the smaller box
+//! ([`FACE_BIAS`]). An edge pair whose axis is almost a face normal, as in every stack that leans by a hair, has to
+//! beat the face as clipped by [`EDGE_BIAS`], since the face gives up to four points and the edges only one. At other
+//! angles edges win at once: a face would push the wrong way.
 //!
-//! A face contact is found without walking polygons: each edge of the incident face is cut by the rectangle of the reference
-//! face (Liang, Barsky, "A new concept and method for line clipping", 1984), four edges side by side, and the corners of the
-//! rectangle that lie over the incident face are added. The rectangle is grown by [`GROWTH`] so that corners that lie on its
-//! border, as in every tidy stack, count as inside and keep their feature.
+//! A face contact is found without walking polygons: each edge of the incident face is cut by the rectangle of the
+//! reference face (Liang, Barsky, "A new concept and method for line clipping", 1984), four edges side by side, and
+//! the corners of the rectangle that lie over the incident face are added. The rectangle is grown by [`GROWTH`] so
+//! that corners that lie on its border, as in every tidy stack, count as inside and keep their feature.
 
 use super::clip::choose_four;
 use super::distance::{Support, closest};
+use super::polyhedron::cuboid_size;
 use super::{Manifold, ManifoldPoint, PairCache};
 use crate::math::{Mat3, Pose, Real, Vec3, clamp, max, min};
 use crate::shape::Cuboid;
 
-/// A face of box 2 is the reference when it is better by this share of the smallest half extent.
+/// A face of box 2 is the reference when it is better by this share of the smaller box's [`cuboid_size`].
 const FACE_BIAS: Real = 2e-3;
-/// An edge pair is looked at when it is better than the best face by this share of the smallest half extent.
+/// An edge pair is looked at when it is better than the best face by this share of the smaller box's [`cuboid_size`].
 const EDGE_GAIN: Real = 2e-4;
-/// Along a face normal, an edge pair makes the contact when the clipped face is deeper by this share of the smallest half extent.
+/// Along a face normal, an edge pair makes the contact when the clipped face is deeper by this share of the smaller
+/// box's [`cuboid_size`].
 pub(super) const EDGE_BIAS: Real = 5e-3;
 /// Cosine above which the axis of an edge pair is taken to be along a face normal (11°).
 pub(super) const ALIGNED: Real = 0.98;
@@ -69,7 +72,7 @@ pub(crate) fn cuboid_cuboid(
     if (1..=15).contains(&cached) && boxes.gap(cached - 1) > margin {
         return;
     }
-    let size = min(cuboid1.half_extents().min_element(), cuboid2.half_extents().min_element());
+    let size = min(cuboid_size(cuboid1.half_extents()), cuboid_size(cuboid2.half_extents()));
     let face = boxes.best_face(margin, size);
     cache.words[0] = face.axis as u32 + 1;
     if face.gap > margin {
@@ -81,12 +84,10 @@ pub(crate) fn cuboid_cuboid(
         if edge.gap > margin {
             return;
         }
-        if boxes.cosine(edge.axis - 6, face.axis) < ALIGNED {
-            boxes.edge_contact(edge.axis - 6, manifold);
-            return;
-        }
     }
-    boxes.face_contact(face.axis, &m, (margin, size), manifold);
+    if edge.is_none_or(|edge| boxes.cosine(edge.axis - 6, face.axis) > ALIGNED) {
+        boxes.face_contact(face.axis, &m, (margin, size), manifold);
+    }
     if let Some(edge) = edge
         && !stands_in(manifold, edge.gap - EDGE_BIAS * size)
     {
@@ -245,7 +246,8 @@ impl Boxes {
     /// Cosine of the angle between the axis of an edge pair and that of a face, never negative.
     fn cosine(&self, pair: usize, face: usize) -> Real {
         let (i, j) = (pair / 3, pair % 3);
-        // `e_i × c_j` has no part along `e_i`, and along another axis the coordinate of `c_j` on the third; so for box 2.
+        // `e_i × c_j` has no part along `e_i`, and along another axis the coordinate of `c_j` on the third; so for box
+        // 2.
         let part = match face {
             k @ 0..=2 if k != i => self.c[3 - i - k][j],
             k @ 3..=5 if k - 3 != j => self.c[i][6 - j - k],
@@ -275,7 +277,8 @@ impl Boxes {
         }
     }
 
-    /// The closest points of one edge of each box.
+    /// The closest points of one edge of each box; nothing if the boxes are apart and the edges are closest beyond
+    /// their ends.
     fn edge_contact(&self, pair: usize, manifold: &mut Manifold) {
         let (i, j) = (pair / 3, pair % 3);
         let column = |k: usize| Vec3::new(self.c[0][k], self.c[1][k], self.c[2][k]);
@@ -298,8 +301,14 @@ impl Boxes {
         let w = p2 - p1;
         let cosine = self.c[i][j];
         let (along1, along2) = (w[i], w.dot(d2));
-        let s = clamp((along1 - cosine * along2) / self.edge_length_squared(i, j), -self.a[i], self.a[i]);
-        manifold.push(ManifoldPoint { point1: p1 + d1 * s, normal, separation: w.dot(normal), feature });
+        let squared = self.edge_length_squared(i, j);
+        let (s, t) = ((along1 - cosine * along2) / squared, (cosine * along1 - along2) / squared);
+        let separation = w.dot(normal);
+        if separation > 0.0 && (s.abs() > self.a[i] || t.abs() > self.b[j]) {
+            return;
+        }
+        let point1 = p1 + d1 * clamp(s, -self.a[i], self.a[i]);
+        manifold.push(ManifoldPoint { point1, normal, separation, feature });
     }
 }
 
@@ -323,8 +332,8 @@ struct FacePair {
 
 /// Corners of a clipped face: coordinates in the reference rectangle and height over it.
 ///
-/// There are at most eight, but rounding might find one twice: hence room for all twelve candidates, and for an index of four
-/// bits, which needs no check. Arrays a coordinate, so that what was written by ones is read by ones.
+/// There are at most eight, but rounding might find one twice: hence room for all twelve candidates, and for an index
+/// of four bits, which needs no check. Arrays a coordinate, so that what was written by ones is read by ones.
 #[derive(Default)]
 struct Patch {
     x: [Real; 16],
@@ -431,7 +440,8 @@ impl FacePair {
         }
     }
 
-    /// The corners of the incident face, and from each the way to the next: two coordinates in the rectangle, then the height.
+    /// The corners of the incident face, and from each the way to the next: two coordinates in the rectangle, then the
+    /// height.
     #[inline(always)]
     fn sides(&self) -> ([[Real; 4]; 3], [[Real; 4]; 3]) {
         let (mut corner, mut way) = ([[0.0; 4]; 3], [[0.0; 4]; 3]);

@@ -1,15 +1,16 @@
 //! Distance of two convex shapes: the Gilbert–Johnson–Keerthi algorithm on support maps.
 //!
-//! Each shape is a core (a point, a segment, corners) grown by a radius. The distance of the cores is that of the origin from
-//! the set of differences `x2 − x1`, which is searched with simplices of up to four of its extreme points: the point `v` of the
-//! simplex closest to the origin gives the next direction, until no extreme point lies further towards the origin.
-//! Sources: Gilbert, Johnson, Keerthi, "A fast procedure for computing the distance between complex objects", 1988; Ericson,
-//! "Real-Time Collision Detection", 2005, chapter 5.1 (closest points of triangles and tetrahedra by regions).
+//! Each shape is a core (a point, a segment, corners) grown by a radius. The distance of the cores is that of the
+//! origin from the set of differences `x2 − x1`, which is searched with simplices of up to four of its extreme points:
+//! the point `v` of the simplex closest to the origin gives the next direction, until no extreme point lies further
+//! towards the origin. Sources: Gilbert, Johnson, Keerthi, "A fast procedure for computing the distance between
+//! complex objects", 1988; Ericson, "Real-Time Collision Detection", 2005, chapter 5.1 (closest points of triangles
+//! and tetrahedra by regions).
 //!
-//! The search runs in `f64` on the `f32` input: gaps of a millimetre beside corners a hundred kilometres away keep their sign
-//! and direction, and the result is the same on every machine, as `f64` arithmetic is IEEE's too. The witness points come from
-//! the weights of the simplex. Only the cores are compared: where they overlap, [`closest`] gives `None` and the caller turns to
-//! the separating axes.
+//! The search runs in `f64` on the `f32` input: gaps of a millimetre beside corners a hundred kilometres away keep
+//! their sign and direction, and the result is the same on every machine, as `f64` arithmetic is IEEE's too. The
+//! witness points come from the weights of the simplex. Only the cores are compared: where they overlap, [`closest`]
+//! gives `None` and the caller turns to the separating axes.
 
 use crate::math::{Pose, Real, Vec3};
 use crate::shape::{Capsule, ConvexHull, Cuboid, Shape, Sphere};
@@ -218,7 +219,8 @@ impl Simplex {
         (0..self.count).fold(DVec3::ZERO, |sum, k| sum + self.corners[k].point1 * self.weights[k])
     }
 
-    /// Keeps the corners of the face, edge or corner closest to the origin and sets their weights; false if it is inside.
+    /// Keeps the corners of the face, edge or corner closest to the origin and sets their weights; false if it is
+    /// inside.
     fn reduce(&mut self) -> bool {
         let p = self.corners.map(|c| c.difference);
         let (indices, weights, count) = match self.count {

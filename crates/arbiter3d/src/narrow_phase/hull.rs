@@ -1,20 +1,22 @@
 //! Convex hulls against hulls and cuboids: separating axes from faces and edge pairs, then a clipped face.
 //!
-//! For a face of one hull the gap is that of its plane to the lowest corner of the other hull. A pair of edges gives a candidate
-//! only where it makes a face of the Minkowski difference: where the arcs that join the normals of their faces cross on the
-//! unit sphere (Gregorius, "The Separating Axis Test between Convex Polyhedra", GDC 2013). With edge directions `e1`, `e2`,
-//! face normals `a`, `b` left and right of `e1`, and `c`, `d` of `e2`, they cross when
+//! For a face of one hull the gap is that of its plane to the lowest corner of the other hull. A pair of edges gives a
+//! candidate only where it makes a face of the Minkowski difference: where the arcs that join the normals of their
+//! faces cross on the unit sphere (Gregorius, "The Separating Axis Test between Convex Polyhedra", GDC 2013). With
+//! edge directions `e1`, `e2`, face normals `a`, `b` left and right of `e1`, and `c`, `d` of `e2`, they cross when
 //!
 //! ```text
 //! (c · e1)(d · e1) < 0,   (a · e2)(b · e2) < 0,   (c · e1)(b · e2) < 0
 //! ```
 //!
-//! Most candidates are never looked at. The other hull holds a ball of radius `r` about its centre `m`, so the gap along a unit
-//! normal `n` that supports this hull at `v` is at most `n · (m − v) − r`. For an edge, `n` is on the arc between two normals, and
-//! `n · (m − v)` is at most the larger of the values at its ends, over the cosine of half the arc where that is positive. What
-//! cannot beat the best gap so far is skipped; in round hulls this leaves the few features next to the contact.
+//! Most candidates are never looked at. The other hull holds a ball of radius `r` about its centre `m`, so the gap
+//! along a unit normal `n` that supports this hull at `v` is at most `n · (m − v) − r`. For an edge, `n` is on the arc
+//! between two normals, and `n · (m − v)` is at most the larger of the values at its ends, over the cosine of half the
+//! arc where that is positive. What cannot beat the best gap so far is skipped; in round hulls this leaves the few
+//! features next to the contact.
 //!
-//! Faces and edges are weighed against each other as in the cuboid kernel, with the inner radius as the size of a hull.
+//! Faces and edges are weighed against each other as in the cuboid kernel, with
+//! [`tolerance_size`](super::polyhedron::tolerance_size) of the inner radius.
 //!
 //! The cache holds the last axis. It only ends the search early, when the hulls are still apart along it.
 
@@ -26,11 +28,11 @@ use super::{Manifold, ManifoldPoint, PairCache};
 use crate::math::{Mat3, Pose, Real, Vec3, clamp, max, min, normalize_or};
 use crate::shape::{ConvexHull, Cuboid, HalfEdge};
 
-/// A face of hull 2 is the reference when it is better by this share of the smaller inner radius.
+/// A face of hull 2 is the reference when it is better by this share of the smaller size.
 const FACE_BIAS: Real = 2e-3;
-/// An edge pair is looked at when it is better than the best face by this share of the smaller inner radius.
+/// An edge pair is looked at when it is better than the best face by this share of the smaller size.
 const EDGE_GAIN: Real = 2e-4;
-/// Share of the smaller inner radius by which side planes are moved out, so that corners on the border stay corners.
+/// Share of the smaller size by which side planes are moved out, so that corners on the border stay corners.
 const GROWTH: Real = 1e-4;
 /// Edges with `sin²` of their angle below this are parallel: faces stand in for them.
 const PARALLEL: Real = 1e-5;
@@ -146,7 +148,7 @@ impl HullPair<'_> {
         if self.cached_gap(cache.words[0], &view1, &view2) > self.margin {
             return;
         }
-        let size = min(self.polyhedron1.inner_radius, self.polyhedron2.inner_radius);
+        let size = min(self.polyhedron1.size, self.polyhedron2.size);
         view1.measure_heights();
         view2.measure_heights();
         let face = self.best_face(&view1, &view2, size);
@@ -160,12 +162,10 @@ impl HullPair<'_> {
             if edges.gap > self.margin {
                 return;
             }
-            if !self.is_aligned(edges, face, &m) {
-                self.edge_contact(edges, &m, manifold);
-                return;
-            }
         }
-        self.face_contact(face, (&view1, &view2), size, manifold);
+        if edges.is_none_or(|edges| self.is_aligned(edges, face, &m)) {
+            self.face_contact(face, (&view1, &view2), size, manifold);
+        }
         if let Some(edges) = edges
             && !stands_in(manifold, edges.gap - EDGE_BIAS * size)
         {
@@ -264,7 +264,7 @@ impl HullPair<'_> {
         (best.code != 0).then_some(best)
     }
 
-    /// Closest points of the two edges.
+    /// Closest points of the two edges; nothing if the hulls are apart and the edges are closest beyond their ends.
     fn edge_contact(&self, edges: Axis, m: &Mat3, manifold: &mut Manifold) {
         let (e1, e2) = edges.edges();
         let edge1 = Edge::new(&self.polyhedron1, e1);
@@ -272,7 +272,12 @@ impl HullPair<'_> {
         let Some((separation, normal)) = edge1.gap(&edge2) else { return };
         let (d1, d2, w) = (edge1.along, edge2.along, edge2.start - edge1.start);
         let (a11, a12, a22) = (d1.dot(d1), d1.dot(d2), d2.dot(d2));
-        let s = (w.dot(d1) * a22 - w.dot(d2) * a12) / (a11 * a22 - a12 * a12);
+        let determinant = a11 * a22 - a12 * a12;
+        let s = (w.dot(d1) * a22 - w.dot(d2) * a12) / determinant;
+        let t = (w.dot(d1) * a12 - w.dot(d2) * a11) / determinant;
+        if separation > 0.0 && !((0.0..=1.0).contains(&s) && (0.0..=1.0).contains(&t)) {
+            return;
+        }
         let point1 = edge1.start + d1 * clamp(s, 0.0, 1.0);
         let feature = 0x8000_0000 | edges.index() as u32;
         manifold.push(ManifoldPoint { point1, normal, separation, feature });
@@ -446,7 +451,8 @@ impl<'a> View<'a> {
             // `highest / cos(half the arc) < limit`, with `cos² = (1 + left · right) / 2`, both sides positive.
             let cosine_squared = 0.5 * (1.0 + planes[left].normal.dot(planes[right].normal));
             let rises = (highest > 0.0) & (highest * highest >= limit * limit * cosine_squared);
-            // Written always, counted if it may matter: whether it does is hard to foretell. There is room for all edges.
+            // Written always, counted if it may matter: whether it does is hard to foretell. There is room for all
+            // edges.
             list[count.min(MAX_EDGES - 1)] = 2 * pair as u16;
             count += ((highest >= limit) | rises) as usize;
         }

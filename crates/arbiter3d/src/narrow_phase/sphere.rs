@@ -1,8 +1,9 @@
 //! Spheres against spheres, capsules, cuboids and hulls: one point, from the closest point of the other shape.
 //!
-//! With `c` the centre of the sphere and `q` the closest point of the other shape's core (a point, a segment, a solid), the
-//! normal is `(c − q) / |c − q|` and the separation `|c − q|` minus the radii. Where `c` is inside a solid, the nearest face
-//! gives normal and depth; where `c = q` any direction square to the core is as good as another.
+//! With `c` the centre of the sphere and `q` the closest point of the other shape's core (a point, a segment, a
+//! solid), the normal is `(c − q) / |c − q|` and the separation `|c − q|` minus the radii. Where `c` is inside a
+//! solid, the nearest face gives normal and depth; where `c = q` any direction square to the core is as good as
+//! another.
 
 use super::distance::{Support, closest};
 use super::polyhedron::Polyhedron;
@@ -51,8 +52,8 @@ pub(crate) fn cuboid_sphere(a: &Cuboid, b: &Sphere, pose: &Pose, margin: Real, m
 
 /// Hull (shape 1) against sphere.
 ///
-/// The face that the centre is highest above holds the closest point whenever the centre is over it, and shows at once when the
-/// pair is apart; beside it, an edge or a corner is closest and [`closest`] finds it.
+/// The face that the centre is highest above holds the closest point whenever the centre is over it, and shows at once
+/// when the pair is apart; beside it, an edge or a corner is closest and [`closest`] finds it.
 pub(crate) fn hull_sphere(a: &ConvexHull, b: &Sphere, pose: &Pose, margin: Real, manifold: &mut Manifold) {
     manifold.clear();
     let polyhedron = Polyhedron::from_hull(a);

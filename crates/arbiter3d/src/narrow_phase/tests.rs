@@ -1,5 +1,6 @@
 //! Laws that every pair of shapes keeps, and the cuboid kernel against separating axes in `f64`.
 
+use super::polyhedron::cuboid_size;
 use super::*;
 use crate::math::{Rotation, Vec3};
 use crate::shape::ConvexHull;
@@ -103,7 +104,7 @@ fn boxes_agree_with_the_separating_axes_in_double_precision() {
         let m = contacts(&Shape::cuboid(h1).unwrap(), &Shape::cuboid(h2).unwrap(), &pose, margin);
         let (d1, d2, rot, dt) = (h1.as_dvec3(), h2.as_dvec3(), matrix(rotation), t.as_dvec3());
         let oracle = box_oracle(d1, d2, &rot, dt) as Real;
-        let size = h1.min_element().min(h2.min_element());
+        let size = cuboid_size(h1).min(cuboid_size(h2));
         assert_sound(&m, size, margin);
         if oracle < -1e-5 {
             assert!(!m.points().is_empty(), "overlap {oracle} lost");
@@ -119,7 +120,8 @@ fn boxes_agree_with_the_separating_axes_in_double_precision() {
         let gap = box_gap(d1, d2, &rot, dt, n.as_dvec3()) as Real;
         assert!(n.dot(t) >= 0.0);
         if oracle <= 0.0 {
-            // The best axis but for the preference for faces: never deeper by more than that, never along a made-up axis.
+            // The best axis but for the preference for faces: never deeper by more than that, never along a made-up
+            // axis.
             assert!(gap <= oracle + 1e-4 * size && lowest(&m) >= oracle - 8e-3 * size, "{gap} {oracle} {size}");
             lifted += (lowest(&m) > 0.0) as u32;
         }
@@ -208,7 +210,7 @@ fn a_box_as_a_hull_is_as_deep_as_the_cuboid() {
         let pose = Pose::new(random.vector() * 1.5, random.rotation());
         let (a, b) = (Shape::cuboid(h1).unwrap(), Shape::cuboid(h2).unwrap());
         let expected = contacts(&a, &b, &pose, 0.0);
-        let size = h1.min_element().min(h2.min_element());
+        let size = cuboid_size(h1).min(cuboid_size(h2));
         for (a, b) in [(box_hull(h1), box_hull(h2)), (box_hull(h1), b.clone()), (a.clone(), box_hull(h2))] {
             let found = contacts(&a, &b, &pose, 0.0);
             assert_sound(&found, size, 0.0);
@@ -522,7 +524,8 @@ fn features_do_not_flicker_in_a_resting_stack() {
     }
 }
 
-/// Two boxes on their edges, crossed: however little they overlap, the normal is square to both edges, not that of a face 45° off.
+/// Two boxes on their edges, crossed: however little they overlap, the normal is square to both edges, not that of a
+/// face 45° off.
 #[test]
 fn crossed_edges_push_square_to_both() {
     let cube = Shape::cuboid(Vec3::splat(0.5)).unwrap();
@@ -559,4 +562,85 @@ fn a_leaning_box_keeps_its_patch() {
             assert!(m.points().len() >= 3 && m.points()[0].normal.y > 0.999, "{position} {rotation:?} {m:?}");
         }
     }
+}
+
+#[test]
+fn a_capsule_beside_an_edge_touches_in_two_points() {
+    let cube = Shape::cuboid(Vec3::ONE).unwrap();
+    let capsule = Shape::capsule(0.5, 0.2).unwrap();
+    let lean = Rotation::from_xyzw(0.003, 0.0, 0.002, 1.0).normalize();
+    for a in [cube, box_hull(Vec3::ONE)] {
+        let m = contacts(&a, &capsule, &Pose::new(Vec3::new(1.12, 0.8, 1.12), lean), 0.02);
+        assert_eq!(m.points().len(), 2);
+        let separation = 0.12 * 2.0_f32.sqrt() - 0.2;
+        for p in m.points() {
+            assert!((p.separation - separation).abs() < 5e-3 && (p.normal.x - p.normal.z).abs() < 0.1);
+            assert!((p.point1.x - 1.0).abs() < 1e-5 && (p.point1.z - 1.0).abs() < 1e-5);
+        }
+        let mut ys = [m.points()[0].point1.y, m.points()[1].point1.y];
+        ys.sort_by(Real::total_cmp);
+        assert!((ys[0] - 0.3).abs() < 1e-3 && (ys[1] - 1.0).abs() < 1e-5, "{ys:?}");
+    }
+}
+
+/// Two sheets a millimetre thick and metres long, one on the other: four corners each time, far from the middle too.
+#[test]
+fn thin_sheets_stack() {
+    let mut random = Random(0x1212_3434_5656_7878);
+    let sheet = Shape::cuboid(Vec3::new(2.0, 0.0005, 1.5)).unwrap();
+    let floor = Shape::cuboid(Vec3::new(100.0, 1.0, 100.0)).unwrap();
+    let hull = box_hull(Vec3::new(2.0, 0.0005, 1.5));
+    for _ in 0..500 {
+        let tilt = random.vector() * 2e-5;
+        let rotation = Rotation::from_xyzw(tilt.x, random.between(-1.0, 1.0), tilt.z, 1.0).normalize();
+        let pose = Pose::new(Vec3::new(random.between(-90.0, 90.0), 1.0004, 40.0), rotation);
+        for upper in [&sheet, &hull] {
+            let m = contacts(&floor, upper, &pose, 0.02);
+            assert!(m.points().len() == 4 && (m.points()[0].normal - Vec3::Y).length() < 1e-6, "{m:?}");
+        }
+    }
+    let m = contacts(&sheet, &sheet, &Pose::new(Vec3::new(0.1, 0.0009, 0.2), turn_y(0.3)), 0.02);
+    assert!(m.points().len() == 4 && m.points().iter().all(|p| (p.separation + 1e-4).abs() < 1e-6), "{m:?}");
+}
+
+/// A pose that is not finite, or a cache from another pair, must not panic: what comes out is caught later.
+#[test]
+fn nonsense_does_not_panic() {
+    let all = shapes();
+    for a in &all {
+        for b in &all {
+            for bad in [Real::NAN, Real::INFINITY, 1e30] {
+                contacts(a, b, &Pose::from_position(Vec3::new(bad, 0.1, 0.0)), 0.02);
+                contacts(a, b, &Pose::new(Vec3::ZERO, Rotation::from_xyzw(bad, 0.0, 0.0, 1.0)), 0.02);
+            }
+            for word in [1, 15, 16, 1 << 30 | 500, 2 << 30 | 99, u32::MAX] {
+                let (pose, mut m) = (Pose::from_position(Vec3::X * 0.4), Manifold::EMPTY);
+                collide(a, b, &pose, 0.02, &mut PairCache { words: [word; 2] }, &mut m);
+                assert_eq!(m.points(), contacts(a, b, &pose, 0.02).points());
+            }
+        }
+    }
+}
+
+/// Boxes and hulls that are apart, against the distance that GJK finds: where edges or corners are closest, the one
+/// point is theirs, and none is told for shapes that only pass each other.
+#[test]
+fn shapes_apart_tell_their_distance() {
+    use super::distance::{Support, closest};
+    let mut random = Random(0x4444_3333_2222_1111);
+    let all = &shapes()[..4];
+    let (mut apart, mut lost, mut early, mut late) = (0, 0, 0, 0);
+    for _ in 0..20_000 {
+        let (a, b) = (&all[random.0 as usize % 3], &all[random.0 as usize / 7 % 3]);
+        let pose = Pose::new(random.direction() * random.between(0.5, 1.3), random.rotation());
+        let Some(c) = closest(&Support::new(a).unwrap(), &Support::new(b).unwrap(), &pose) else { continue };
+        let m = contacts(a, b, &pose, 0.1);
+        if c.distance < 0.1 {
+            apart += 1;
+            lost += m.points().is_empty() as u32;
+            late += (!m.points().is_empty() && lowest(&m) > c.distance + 0.02) as u32;
+            early += (!m.points().is_empty() && lowest(&m) < c.distance - 0.02) as u32;
+        }
+    }
+    assert!(apart > 1000 && lost == 0 && early * 50 < apart && late * 50 < apart, "{apart} {lost} {early} {late}");
 }

@@ -1,16 +1,17 @@
 //! When two moving convex shapes first come within a given distance: conservative advancement.
 //!
-//! At time `t` let the gap be `d` along the unit normal `n` of the closest points. A plane square to `n` separates the shapes, and
-//! no point crosses it faster than
+//! At time `t` let the gap be `d` along the unit normal `n` of the closest points. A plane square to `n` separates the
+//! shapes, and no point crosses it faster than
 //!
 //! ```text
 //! speed ≤ (v1 − v2) · n + reach1 |ω1 × n| + reach2 |ω2 × n|
 //! ```
 //!
-//! so the gap stays above `target` for at least `(d − target) / speed`: the time goes on by that much, and the distance is taken
-//! anew, until it is the target's (Mirtich, "Impulse-based Dynamic Simulation", 1996, section 2.3). Nothing can be jumped over,
-//! however thin it is and however fast the shapes are. Positions move evenly; rotations blend as in [`Pose::interpolate`], about
-//! one axis, at most `4 tan(φ / 2)` radians per unit of time with `cos φ` the dot product of the quaternions.
+//! so the gap stays above `target` for at least `(d − target) / speed`: the time goes on by that much, and the
+//! distance is taken anew, until it is the target's (Mirtich, "Impulse-based Dynamic Simulation", 1996, section 2.3).
+//! Nothing can be jumped over, however thin it is and however fast the shapes are. Positions move evenly; rotations
+//! blend as in [`Pose::interpolate`], about one axis, at most `4 tan(φ / 2)` radians per unit of time with `cos φ` the
+//! dot product of the quaternions.
 //!
 //! Positions are subtracted in `f64` before they are rounded, so sweeps far from the origin lose nothing more.
 
@@ -45,7 +46,8 @@ impl Sweep {
     fn spin(&self) -> Vec3 {
         let (p, q) = (self.start.rotation, self.end.rotation);
         let sign = if p.dot(q) < 0.0 { -1.0 } else { 1.0 };
-        // q p*: its vector part is sin φ times the axis. 4 tan(φ/2) = 4 sin φ / (1 + cos φ) needs no root and no difference.
+        // q p*: its vector part is sin φ times the axis. 4 tan(φ/2) = 4 sin φ / (1 + cos φ) needs no root and no
+        // difference.
         let turn = q.mul(p.conjugate()).vector() * sign;
         turn * (4.0 / (1.0 + p.dot(q).abs()))
     }
@@ -76,13 +78,13 @@ impl<'a> Motion<'a> {
     }
 }
 
-/// The first time in `[0, 1]` at which the gap of two moving shapes falls to `target` (metres, about a tenth more counts), or
-/// `None` if it never does.
+/// The first time in `[0, 1]` at which the gap of two moving shapes falls to `target` (metres, about a tenth more
+/// counts), or `None` if it never does.
 ///
-/// Shapes that overlap at the start give `None`: they have a touching contact, which is for the solver to part. Shapes that start
-/// apart but within `target` are stopped where half of that first gap is left, so that one that slides along another is
-/// not held. After [`MAX_ROUNDS`] rounds (fast spin close to a surface) the time reached is given back: nothing is ever missed, a
-/// stop may be early.
+/// Shapes that overlap at the start give `None`: they have a touching contact, which is for the solver to part. Shapes
+/// that start apart but within `target` are stopped where half of that first gap is left, so that one that slides
+/// along another is not held. After [`MAX_ROUNDS`] rounds (fast spin close to a surface) the time reached is given
+/// back: nothing is ever missed, a stop may be early.
 pub(crate) fn time_of_impact(
     shape1: &Support,
     sweep1: &Sweep,
@@ -199,7 +201,8 @@ mod tests {
         assert!(t > 0.0 && t < 1e-3, "{t}");
     }
 
-    /// A rod of length 2 turns a quarter about its middle beside a wall at 0.5: it hits where its end is 0.5 out, at 30°.
+    /// A rod of length 2 turns a quarter about its middle beside a wall at 0.5: it hits where its end is 0.5 out, at
+    /// 30°.
     #[test]
     fn a_turning_rod_hits_with_its_end() {
         let rod = Shape::capsule(1.0, 0.01).unwrap();
