@@ -205,11 +205,9 @@ impl Candidates {
             }
         }
         let mut count = 0;
-        for i in 0..self.count {
-            if keep[i] {
-                self.list[count] = self.list[i];
-                count += 1;
-            }
+        for (i, _) in keep.iter().enumerate().filter(|(_, kept)| **kept) {
+            self.list[count] = self.list[i];
+            count += 1;
         }
         self.count = count;
     }

@@ -450,3 +450,62 @@ fn a_huge_box_on_thousands_of_triangles_keeps_the_rim() {
         assert!((p.separation + 0.001).abs() < 1e-5 && p.normal == Vec3::Y);
     }
 }
+
+/// A slope a kilometre from the origin, its corners rounded to 30 µm: the normal stays the slope's to a ten thousandth
+/// (the rounding), whichever seams the shape lies over.
+#[test]
+fn a_rounded_slope_has_no_bumps() {
+    let slope = 0.75;
+    let far = Vec3::new(1000.3, 500.7, -800.1);
+    let flat = floor(60, 0.7, |x, _| x * slope);
+    let vertices: Vec<Vec3> = flat.vertices().iter().map(|v| *v + far).collect();
+    let mesh = TriangleMesh::new(vertices, flat.triangles().to_vec()).unwrap();
+    let normal = Vec3::new(-0.6, 0.8, 0.0);
+    let mut random = Random(41);
+    for shape in some_shapes().unwrap() {
+        for _ in 0..300 {
+            let turn = random.rotation();
+            let down = turn.inverse_rotate(-normal);
+            let below = match &shape {
+                Shape::Sphere(s) => s.radius(),
+                Shape::Capsule(c) => c.radius() + down.y.abs() * c.half_length(),
+                Shape::Cuboid(c) => down.abs().dot(c.half_extents()),
+                Shape::Hull(h) => down.dot(h.support(down).1),
+                Shape::Mesh(_) => 0.0,
+            };
+            let (x, z) = (8.0 * random.next(), 8.0 * random.next());
+            let pose = Pose::new(Vec3::new(x, x * slope, z) + far + normal * (below - 0.005), turn);
+            let manifold = touch(&mesh, &shape, &pose);
+            let deepest = manifold.points().iter().map(|p| p.separation).fold(9.0, Real::min);
+            assert!((deepest + 0.005).abs() < 2e-4, "{deepest} {pose:?}");
+            for p in manifold.points() {
+                assert!((p.normal - normal).length() < 3e-4, "{shape:?} {pose:?} {p:?}");
+            }
+        }
+    }
+}
+
+/// A floor with dents: whatever lies level on it is never tripped, that is pushed along a normal steeper than the
+/// steepest dent, by the sides of the dents' triangles.
+#[test]
+fn small_dents_do_not_trip() {
+    let mut random = Random(51);
+    for dent in [1e-4, 1e-3, 5e-3] {
+        let heights: Vec<Real> = (0..61 * 61).map(|_| dent * random.next()).collect();
+        let mesh = floor(60, 0.25, |x, z| heights[(z / 0.25 + 30.5) as usize * 61 + (x / 0.25 + 30.5) as usize]);
+        let steepest = (0..mesh.triangles().len()).map(|i| (mesh.facet(i).normal - Vec3::Y).length());
+        let steepest = steepest.fold(0.0, Real::max);
+        for shape in some_shapes().unwrap() {
+            for _ in 0..300 {
+                let turn = Rotation::from_xyzw(0.0, random.next(), 0.0, random.next()).normalize();
+                let mut pose = Pose::new(random.vector() * 4.0, turn);
+                pose.position.y = 0.0;
+                pose.position.y = -lowest(&shape, &pose) - 0.002;
+                for p in touch(&mesh, &shape, &pose).points() {
+                    let tilt = (p.normal - Vec3::Y).length();
+                    assert!(tilt <= 1.5 * steepest + 2e-3, "{dent} {tilt} {steepest} {pose:?} {p:?} {shape:?}");
+                }
+            }
+        }
+    }
+}

@@ -87,8 +87,8 @@ impl Solid for Solids<'_> {
             return false;
         }
         let pair = Pair { solid: &self.features, triangle, reach, face: self.underside.face, height };
-        let plain = triangle.facet.sharp_edges == 0 && triangle.facet.sharp_corners == 0;
-        if plain && height >= -SHALLOW * self.features.inner_radius && !reach.second_look {
+        let shallow = triangle.is_plain() && height >= -SHALLOW * self.features.inner_radius;
+        if (shallow || pair.stands_on_face(self.underside.corner)) && !reach.second_look {
             return pair.touch_face(out) == 0 && height < 0.0;
         }
         let Some((axis, separation)) = pair.least_overlap() else { return false };
@@ -143,6 +143,14 @@ struct Pair<'a> {
 }
 
 impl Pair<'_> {
+    /// Whether the lowest corner is over the triangle, farther from each edge than deep. Then no axis is better than the
+    /// face's: along one that leans by the angle θ the corner overlaps by at least `depth · (cos θ + sin θ)`.
+    fn stands_on_face(&self, corner: usize) -> bool {
+        let corner = self.solid.vertices[corner];
+        let triangle = self.triangle;
+        (0..3).all(|i| triangle.inward[i].dot(corner - triangle.corners[i]) >= self.height.abs())
+    }
+
     /// The axis of least overlap and the separation along it; `None` if some axis shows a gap beyond the margin. The
     /// triangle's face wins unless another axis is better by more than rounding and rocking can make it.
     fn least_overlap(&self) -> Option<(Axis, Real)> {
@@ -241,12 +249,14 @@ impl Pair<'_> {
         let triangle = self.triangle;
         let (face, seams) = (self.face, !self.reach.second_look);
         let mut points = 0;
-        let mut under = [true; 3];
+        // Corners amid a flat surface are no ends of the contact.
+        let mut under = [0, 1, 2].map(|i| !(seams && triangle.facet.flat_corners >> i & 1 == 1));
+        let any = under != [false; 3];
         for edge in self.solid.face_loop(face) {
             let (a, b) = self.solid.edge_points(edge);
             // Looks into the face's prism: the face winds clockwise as seen from the triangle.
             let inside = (b - a).cross(triangle.normal);
-            for (corner, under) in triangle.corners.iter().zip(&mut under) {
+            for (corner, under) in triangle.corners.iter().zip(&mut under).filter(|_| any) {
                 *under &= inside.dot(*corner - a) > 0.0;
             }
             let Some((ends, cuts)) = triangle.clip(a, b) else { continue };
@@ -263,8 +273,7 @@ impl Pair<'_> {
         let plane = self.solid.planes[face];
         let slope = plane.normal.dot(triangle.normal);
         for (i, corner) in triangle.corners.iter().enumerate() {
-            let flat = seams && triangle.facet.flat_corners >> i & 1 == 1;
-            if under[i] && slope < -0.01 && !flat {
+            if under[i] && slope < -0.01 {
                 let gap = (plane.offset - plane.normal.dot(*corner)) / slope;
                 let feature = 512 + (triangle.facet.id << 2 | i as u32);
                 points += self.face_point(*corner + triangle.normal * gap, feature, out);
