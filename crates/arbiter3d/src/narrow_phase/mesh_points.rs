@@ -66,7 +66,11 @@ impl Candidates {
         self.deepest
     }
 
+    /// Adds a point. One that is not finite (shapes too large for single precision) is left out.
     pub(super) fn push(&mut self, candidate: Candidate) {
+        if !(candidate.separation.is_finite() && candidate.position.is_finite() && candidate.normal.is_finite()) {
+            return;
+        }
         if self.count == CAPACITY {
             self.thin_out();
         }
