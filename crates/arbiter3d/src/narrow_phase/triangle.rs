@@ -169,13 +169,18 @@ impl<'a> Triangle<'a> {
         true
     }
 
-    /// The part of the segment from `a` to `b` above the face, as two numbers in `[0, 1]`, and which edges cut it off
-    /// (3 for none); `None` if no part is.
-    pub(super) fn clip(&self, a: Vec3, b: Vec3) -> Option<([Real; 2], [u32; 2])> {
+    /// How far inside each of its three sides a point is.
+    #[inline(always)]
+    pub(super) fn insides(&self, point: Vec3) -> [Real; 3] {
+        [0, 1, 2].map(|i| self.inward[i].dot(point - self.corners[i]) + self.slack)
+    }
+
+    /// The part of a segment above the face, given how far inside the sides its ends are: two numbers in `[0, 1]`, and
+    /// which sides cut it off (3 for none); `None` if no part is.
+    #[inline(always)]
+    pub(super) fn clip(start: &[Real; 3], end: &[Real; 3]) -> Option<([Real; 2], [u32; 2])> {
         let (mut ends, mut cuts) = ([0.0, 1.0], [3, 3]);
-        for i in 0..3 {
-            let da = self.inward[i].dot(a - self.corners[i]) + self.slack;
-            let db = self.inward[i].dot(b - self.corners[i]) + self.slack;
+        for (i, (&da, &db)) in start.iter().zip(end).enumerate() {
             if da < 0.0 && db < 0.0 {
                 return None;
             }
@@ -324,7 +329,7 @@ impl Solid for Capsule {
             return false;
         }
         let mut missing = lowest < self.radius();
-        if let Some((ends, cuts)) = triangle.clip(-end, end) {
+        if let Some((ends, cuts)) = Triangle::clip(&triangle.insides(-end), &triangle.insides(end)) {
             let heights = ends.map(|t| low + (high - low) * t);
             // A segment that runs under the triangle without crossing it counts only while the capsule still reaches up
             // through the plane.
