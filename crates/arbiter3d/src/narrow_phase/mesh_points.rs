@@ -66,7 +66,11 @@ impl Candidates {
         self.deepest
     }
 
+    /// Adds a point. One that is not finite (shapes too large for single precision) is left out.
     pub(super) fn push(&mut self, candidate: Candidate) {
+        if !(candidate.separation.is_finite() && candidate.position.is_finite() && candidate.normal.is_finite()) {
+            return;
+        }
         if self.count == CAPACITY {
             self.thin_out();
         }
@@ -205,11 +209,9 @@ impl Candidates {
             }
         }
         let mut count = 0;
-        for i in 0..self.count {
-            if keep[i] {
-                self.list[count] = self.list[i];
-                count += 1;
-            }
+        for (i, _) in keep.iter().enumerate().filter(|(_, kept)| **kept) {
+            self.list[count] = self.list[i];
+            count += 1;
         }
         self.count = count;
     }

@@ -42,13 +42,23 @@ fn floor(cells: u32, size: Real, y: impl Fn(Real, Real) -> Real) -> TriangleMesh
     TriangleMesh::new(vertices, triangles).unwrap()
 }
 
-/// The surface of a box, two triangles a side.
-fn block(half: Vec3) -> TriangleMesh {
-    let vertices = (0..8)
-        .map(|i| Vec3::new([-half.x, half.x][i & 1], [-half.y, half.y][i >> 1 & 1], [-half.z, half.z][i >> 2]))
-        .collect();
-    let quads = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
-    let triangles = quads.iter().flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]).collect();
+/// The surface of a box, each side cut into `cuts × cuts` squares.
+fn block(half: Vec3, cuts: u32) -> TriangleMesh {
+    let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+    for (u, v) in [(Vec3::X, Vec3::Y), (Vec3::Y, Vec3::Z), (Vec3::Z, Vec3::X)] {
+        for (u, v) in [(u, v), (v, u)] {
+            let start = vertices.len() as u32;
+            let at = |i: u32| 2.0 * i as Real / cuts as Real - 1.0;
+            for i in 0..=cuts {
+                vertices.extend((0..=cuts).map(|j| (u * at(i) + v * at(j) + u.cross(v)) * half));
+            }
+            for cell in 0..cuts * cuts {
+                let i = start + cell / cuts * (cuts + 1) + cell % cuts;
+                let (right, up) = (i + cuts + 1, i + 1);
+                triangles.extend([[i, right, up], [up, right, right + 1]]);
+            }
+        }
+    }
     TriangleMesh::new(vertices, triangles).unwrap()
 }
 
@@ -208,20 +218,19 @@ fn a_ridge_pushes_between_its_sides() {
 /// A box hanging over the edge of a block, rocked by any small angle, is held up and never pushed off sideways.
 #[test]
 fn an_overhanging_box_is_not_pushed_sideways() {
-    let mesh = block(Vec3::new(2.0, 1.0, 3.0));
+    let blocks = [1, 3, 40].map(|cuts| block(Vec3::new(2.0, 1.0, 3.0), cuts));
     let mut random = Random(4);
-    for shape in [Shape::cuboid(Vec3::new(0.5, 0.3, 0.5)).unwrap(), some_shapes().unwrap()[3].clone()] {
-        for i in 0..500 {
-            let rock = random.vector() * 0.05;
-            let turn = Rotation::from_xyzw(rock.x, 0.3 * random.next(), rock.z, 1.0).normalize();
-            let mut pose = Pose::new(Vec3::new(2.0 + 0.4 * random.next(), 0.0, 2.9 * random.next()), turn);
-            pose.position.y = 1.0 - lowest(&shape, &pose) - 0.002;
-            let manifold = touch(&mesh, &shape, &pose);
-            for p in manifold.points() {
-                assert!(p.separation > -0.05, "{i} {pose:?} {manifold:?}");
-                if p.separation < 0.0 {
-                    assert!(p.normal.y > 0.95, "{i} {pose:?} {manifold:?}");
-                }
+    let shape = Shape::cuboid(Vec3::new(0.5, 0.3, 0.5)).unwrap();
+    for i in 0..3000 {
+        let rock = random.vector() * 0.05;
+        let turn = Rotation::from_xyzw(rock.x, 0.3 * random.next(), rock.z, 1.0).normalize();
+        let mut pose = Pose::new(Vec3::new(2.0 + 0.4 * random.next(), 0.0, 2.9 * random.next()), turn);
+        pose.position.y = 1.0 - lowest(&shape, &pose) - 0.002;
+        let manifold = touch(&blocks[i % 3], &shape, &pose);
+        for p in manifold.points() {
+            assert!(p.separation > -0.003, "{i} {pose:?} {manifold:?}");
+            if p.separation < 0.0 {
+                assert!(p.normal.y > 0.95, "{i} {pose:?} {manifold:?}");
             }
         }
     }
@@ -448,5 +457,94 @@ fn a_huge_box_on_thousands_of_triangles_keeps_the_rim() {
     for p in manifold.points() {
         assert!((p.point1.x.abs() - 5.0).abs() < 1e-3 && (p.point1.z.abs() - 5.0).abs() < 1e-3, "{manifold:?}");
         assert!((p.separation + 0.001).abs() < 1e-5 && p.normal == Vec3::Y);
+    }
+}
+
+/// A slope a kilometre from the origin, its corners rounded to 30 µm: the normal stays the slope's to a ten thousandth
+/// (the rounding), whichever seams the shape lies over.
+#[test]
+fn a_rounded_slope_has_no_bumps() {
+    let slope = 0.75;
+    let far = Vec3::new(1000.3, 500.7, -800.1);
+    let flat = floor(60, 0.7, |x, _| x * slope);
+    let vertices: Vec<Vec3> = flat.vertices().iter().map(|v| *v + far).collect();
+    let mesh = TriangleMesh::new(vertices, flat.triangles().to_vec()).unwrap();
+    let normal = Vec3::new(-0.6, 0.8, 0.0);
+    let mut random = Random(41);
+    for shape in some_shapes().unwrap() {
+        for _ in 0..300 {
+            let turn = random.rotation();
+            let down = turn.inverse_rotate(-normal);
+            let below = match &shape {
+                Shape::Sphere(s) => s.radius(),
+                Shape::Capsule(c) => c.radius() + down.y.abs() * c.half_length(),
+                Shape::Cuboid(c) => down.abs().dot(c.half_extents()),
+                Shape::Hull(h) => down.dot(h.support(down).1),
+                Shape::Mesh(_) => 0.0,
+            };
+            let (x, z) = (8.0 * random.next(), 8.0 * random.next());
+            let pose = Pose::new(Vec3::new(x, x * slope, z) + far + normal * (below - 0.005), turn);
+            let manifold = touch(&mesh, &shape, &pose);
+            let deepest = manifold.points().iter().map(|p| p.separation).fold(9.0, Real::min);
+            assert!((deepest + 0.005).abs() < 2e-4, "{deepest} {pose:?}");
+            for p in manifold.points() {
+                assert!((p.normal - normal).length() < 3e-4, "{shape:?} {pose:?} {p:?}");
+            }
+        }
+    }
+}
+
+/// A floor with dents: whatever lies level on it is never tripped, that is pushed along a normal steeper than the
+/// steepest dent, by the sides of the dents' triangles.
+#[test]
+fn small_dents_do_not_trip() {
+    let mut random = Random(51);
+    for dent in [1e-4, 1e-3, 5e-3] {
+        let heights: Vec<Real> = (0..61 * 61).map(|_| dent * random.next()).collect();
+        let mesh = floor(60, 0.25, |x, z| heights[(z / 0.25 + 30.5) as usize * 61 + (x / 0.25 + 30.5) as usize]);
+        let steepest = (0..mesh.triangles().len()).map(|i| (mesh.facet(i).normal - Vec3::Y).length());
+        let steepest = steepest.fold(0.0, Real::max);
+        for shape in some_shapes().unwrap() {
+            for _ in 0..300 {
+                let turn = Rotation::from_xyzw(0.0, random.next(), 0.0, random.next()).normalize();
+                let mut pose = Pose::new(random.vector() * 4.0, turn);
+                pose.position.y = 0.0;
+                pose.position.y = -lowest(&shape, &pose) - 0.002;
+                for p in touch(&mesh, &shape, &pose).points() {
+                    let tilt = (p.normal - Vec3::Y).length();
+                    assert!(tilt <= 1.5 * steepest + 2e-3, "{dent} {tilt} {steepest} {pose:?} {p:?} {shape:?}");
+                }
+            }
+        }
+    }
+}
+
+/// Poses and shapes that overflow single precision give no nonsense and no panic; a margin of zero still finds overlaps.
+#[test]
+fn extreme_numbers_are_survived() {
+    let mesh = floor(10, 1.0, |x, z| 0.2 * ((x + 2.0 * z) as i32 % 3) as Real);
+    let mut random = Random(61);
+    for scale in [0.0, 1e-30, 1e10, 1e18, 1e25, 1e38, Real::INFINITY, Real::NAN] {
+        for shape in some_shapes().unwrap() {
+            for p in touch(&mesh, &shape, &Pose::new(Vec3::Y * scale, random.rotation())).points() {
+                assert!(p.normal.is_normalized() && p.point1.is_finite());
+            }
+        }
+        if let Ok(shape) = Shape::cuboid(Vec3::splat(scale)) {
+            for p in touch(&mesh, &shape, &at(0.1, 0.9 * scale, 0.2)).points() {
+                assert!(p.normal.is_normalized() && p.point1.is_finite() && p.separation.is_finite());
+            }
+        }
+    }
+    let mut manifold = Manifold::EMPTY;
+    let flat = floor(10, 1.0, |_, _| 0.0);
+    for shape in some_shapes().unwrap() {
+        let mut pose = Pose::new(Vec3::ZERO, random.rotation());
+        pose.position.y = -lowest(&shape, &pose) - 0.01;
+        collide(&flat, &shape, &pose, 0.0, &mut PairCache::default(), &mut manifold);
+        assert!(manifold.points().iter().any(|p| (p.separation + 0.01).abs() < 1e-5));
+        pose.position.y += 0.011;
+        collide(&flat, &shape, &pose, 0.0, &mut PairCache::default(), &mut manifold);
+        assert!(manifold.points().is_empty());
     }
 }

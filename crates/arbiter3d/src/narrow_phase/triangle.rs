@@ -70,15 +70,12 @@ impl<'a> Triangle<'a> {
     ) -> Option<Self> {
         let facet = mesh.facet(index);
         let corners = facet.corners.map(|c| frame.inverse * (c - frame.position));
-        let (low, high) = (min3(corners[0], min3(corners[1], corners[2])), max3(corners[0], max3(corners[1], corners[2])));
+        let (low, high) =
+            (min3(corners[0], min3(corners[1], corners[2])), max3(corners[0], max3(corners[1], corners[2])));
         if !bounds.overlaps(&Aabb::new(low, high)) {
             return None;
         }
         let front = frame.inverse * facet.normal;
-        let inward = |i: usize| {
-            let across = front.cross(corners[(i + 1) % 3] - corners[i]);
-            across * (1.0 / across.length())
-        };
         let extent = max3(abs3(low), abs3(high));
         let size = max(extent.x, max(extent.y, extent.z));
         Some(Self {
@@ -89,7 +86,7 @@ impl<'a> Triangle<'a> {
             corners,
             normal: front * side,
             offset: facet.normal.dot(facet.corners[0] - frame.position) * side,
-            inward: [inward(0), inward(1), inward(2)],
+            inward: facet.inward.map(|u| frame.inverse * u),
             slack: 1e-3 * frame.scale + 2e-7 * size,
         })
     }
@@ -111,6 +108,12 @@ impl<'a> Triangle<'a> {
     #[inline(always)]
     pub(super) fn is_seam(&self, cut: u32) -> bool {
         self.facet.flat_edges >> cut & 1 == 1
+    }
+
+    /// Whether no edge and no corner can touch, only the face.
+    #[inline(always)]
+    pub(super) fn is_plain(&self) -> bool {
+        self.facet.sharp_edges | self.facet.sharp_corners == 0
     }
 
     #[inline(always)]
@@ -166,13 +169,18 @@ impl<'a> Triangle<'a> {
         true
     }
 
-    /// The part of the segment from `a` to `b` above the face, as two numbers in `[0, 1]`, and which edges cut it off
-    /// (3 for none); `None` if no part is.
-    pub(super) fn clip(&self, a: Vec3, b: Vec3) -> Option<([Real; 2], [u32; 2])> {
+    /// How far inside each of its three sides a point is.
+    #[inline(always)]
+    pub(super) fn insides(&self, point: Vec3) -> [Real; 3] {
+        [0, 1, 2].map(|i| self.inward[i].dot(point - self.corners[i]) + self.slack)
+    }
+
+    /// The part of a segment above the face, given how far inside the sides its ends are: two numbers in `[0, 1]`, and
+    /// which sides cut it off (3 for none); `None` if no part is.
+    #[inline(always)]
+    pub(super) fn clip(start: &[Real; 3], end: &[Real; 3]) -> Option<([Real; 2], [u32; 2])> {
         let (mut ends, mut cuts) = ([0.0, 1.0], [3, 3]);
-        for i in 0..3 {
-            let da = self.inward[i].dot(a - self.corners[i]) + self.slack;
-            let db = self.inward[i].dot(b - self.corners[i]) + self.slack;
+        for (i, (&da, &db)) in start.iter().zip(end).enumerate() {
             if da < 0.0 && db < 0.0 {
                 return None;
             }
@@ -253,6 +261,9 @@ impl Solid for Sphere {
             out.push(triangle.face_candidate(Vec3::ZERO, height, self.radius(), 0));
             return false;
         }
+        if triangle.is_plain() && !reach.second_look {
+            return height < self.radius();
+        }
         let mut nearest = (Real::MAX, 0, 0.0, Vec3::ZERO);
         for i in 0..3 {
             let (a, b) = triangle.edge(i);
@@ -318,14 +329,16 @@ impl Solid for Capsule {
             return false;
         }
         let mut missing = lowest < self.radius();
-        if let Some((ends, cuts)) = triangle.clip(-end, end) {
+        if let Some((ends, cuts)) = Triangle::clip(&triangle.insides(-end), &triangle.insides(end)) {
             let heights = ends.map(|t| low + (high - low) * t);
             // A segment that runs under the triangle without crossing it counts only while the capsule still reaches up
             // through the plane.
             let crosses = max(heights[0], heights[1]) >= -self.radius();
             let count = if ends[1] - ends[0] > 1e-6 { 2 } else { 1 };
             for k in 0..count {
-                if crosses && heights[k] - self.radius() <= reach.margin && (reach.second_look || !triangle.is_seam(cuts[k]))
+                if crosses
+                    && heights[k] - self.radius() <= reach.margin
+                    && (reach.second_look || !triangle.is_seam(cuts[k]))
                 {
                     let cut = 2 + (triangle.facet.id << 3 | cuts[k] << 1 | k as u32);
                     let feature = if cuts[k] == 3 { k as u32 } else { cut };

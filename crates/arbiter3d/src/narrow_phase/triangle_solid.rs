@@ -43,6 +43,9 @@ struct Underside {
     corner: usize,
     /// The face at that corner that lies flattest.
     face: usize,
+    /// A ball around that face.
+    center: Vec3,
+    radius: Real,
 }
 
 /// The axis of least overlap.
@@ -86,9 +89,9 @@ impl Solid for Solids<'_> {
         if height > reach.margin {
             return false;
         }
-        let pair = Pair { solid: &self.features, triangle, reach, face: self.underside.face, height };
-        let plain = triangle.facet.sharp_edges == 0 && triangle.facet.sharp_corners == 0;
-        if plain && height >= -SHALLOW * self.features.inner_radius && !reach.second_look {
+        let pair = Pair { solid: &self.features, triangle, reach, underside: &self.underside, height };
+        let shallow = triangle.is_plain() && height >= -SHALLOW * self.features.inner_radius;
+        if (shallow || pair.stands_on_face(self.underside.corner)) && !reach.second_look {
             return pair.touch_face(out) == 0 && height < 0.0;
         }
         let Some((axis, separation)) = pair.least_overlap() else { return false };
@@ -127,7 +130,10 @@ impl Underside {
                 }
             }
         }
-        Self { normal, corner: lowest.0, face: flattest.0 }
+        let corners = || solid.face_loop(flattest.0).map(|edge| solid.edge_points(edge).0);
+        let center = Aabb::from_points(corners()).center();
+        let squared = corners().fold(0.0, |m, corner| max(m, (corner - center).length_squared()));
+        Self { normal, corner: lowest.0, face: flattest.0, center, radius: squared.sqrt() }
     }
 }
 
@@ -136,13 +142,20 @@ struct Pair<'a> {
     solid: &'a Polyhedron<'a>,
     triangle: &'a Triangle<'a>,
     reach: &'a Reach,
-    /// The solid's lowest face.
-    face: usize,
+    underside: &'a Underside,
     /// Of the solid's lowest corner over the triangle's plane.
     height: Real,
 }
 
 impl Pair<'_> {
+    /// Whether the lowest corner is over the triangle, farther from each edge than deep. Then no axis is better than the
+    /// face's: along one that leans by the angle θ the corner overlaps by at least `depth · (cos θ + sin θ)`.
+    fn stands_on_face(&self, corner: usize) -> bool {
+        let corner = self.solid.vertices[corner];
+        let triangle = self.triangle;
+        (0..3).all(|i| triangle.inward[i].dot(corner - triangle.corners[i]) >= self.height.abs())
+    }
+
     /// The axis of least overlap and the separation along it; `None` if some axis shows a gap beyond the margin. The
     /// triangle's face wins unless another axis is better by more than rounding and rocking can make it.
     fn least_overlap(&self) -> Option<(Axis, Real)> {
@@ -239,17 +252,27 @@ impl Pair<'_> {
     /// The solid's lowest face cut by the prism over the triangle, and the triangle's corners under that face.
     fn touch_face(&self, out: &mut Candidates) -> usize {
         let triangle = self.triangle;
-        let (face, seams) = (self.face, !self.reach.second_look);
+        let seams = !self.reach.second_look;
         let mut points = 0;
-        let mut under = [true; 3];
+        let Underside { face, center, radius, .. } = *self.underside;
+        if triangle.insides(center).iter().any(|inside| *inside < -radius) {
+            return 0;
+        }
+        let first = self.solid.edge_points(self.solid.face_edges[face] as usize).0;
+        let mut end = triangle.insides(first);
+        // Corners amid a flat surface are no ends of the contact.
+        let mut under = [0, 1, 2].map(|i| !(seams && triangle.facet.flat_corners >> i & 1 == 1));
+        let any = under != [false; 3];
         for edge in self.solid.face_loop(face) {
             let (a, b) = self.solid.edge_points(edge);
             // Looks into the face's prism: the face winds clockwise as seen from the triangle.
             let inside = (b - a).cross(triangle.normal);
-            for (corner, under) in triangle.corners.iter().zip(&mut under) {
+            for (corner, under) in triangle.corners.iter().zip(&mut under).filter(|_| any) {
                 *under &= inside.dot(*corner - a) > 0.0;
             }
-            let Some((ends, cuts)) = triangle.clip(a, b) else { continue };
+            let start = end;
+            end = triangle.insides(b);
+            let Some((ends, cuts)) = Triangle::clip(&start, &end) else { continue };
             if cuts[0] == 3 {
                 points += self.face_point(a, u32::from(self.solid.edges[edge].origin), out);
             }
@@ -263,8 +286,7 @@ impl Pair<'_> {
         let plane = self.solid.planes[face];
         let slope = plane.normal.dot(triangle.normal);
         for (i, corner) in triangle.corners.iter().enumerate() {
-            let flat = seams && triangle.facet.flat_corners >> i & 1 == 1;
-            if under[i] && slope < -0.01 && !flat {
+            if under[i] && slope < -0.01 {
                 let gap = (plane.offset - plane.normal.dot(*corner)) / slope;
                 let feature = 512 + (triangle.facet.id << 2 | i as u32);
                 points += self.face_point(*corner + triangle.normal * gap, feature, out);
@@ -370,7 +392,7 @@ impl Pair<'_> {
             let (da, db) = (self.triangle.height(a), self.triangle.height(b));
             if da * db < 0.0 {
                 let point = a + (b - a) * (da / (da - db));
-                if self.triangle.clip(point, point).is_some() {
+                if self.triangle.insides(point).iter().all(|inside| *inside >= 0.0) {
                     self.push_out(point, 16 + edge as u32, out);
                 }
             }

@@ -31,6 +31,8 @@ const FLAT_SINE: Real = 1e-3;
 /// The neighbourhood of one triangle.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Neighborhood {
+    /// Unit vector in the plane of the triangle itself, from edge `i` inwards.
+    pub(super) own: [Vec3; 3],
     /// Unit vector in the plane of the neighbour across edge `i`, at a right angle to the edge and away from it; zero at a boundary.
     pub(crate) inward: [Vec3; 3],
     /// Welded number of corner `i`.
@@ -116,6 +118,7 @@ impl Adjacency {
         };
         let triangle = &mut self.triangles[side.2 as usize];
         triangle.kinds[side.3 as usize] = kind;
+        triangle.own[side.3 as usize] = own;
         if let Some((_, other, inward)) = closest {
             triangle.inward[side.3 as usize] = inward;
             if kind == MeshEdge::Flat {
