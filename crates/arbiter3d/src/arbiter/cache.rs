@@ -99,8 +99,7 @@ impl ContactData {
                 continue;
             }
             let contact = &mut self.slots[slot];
-            let between =
-                pose2.transform_point(contact.local_anchor2) - pose1.transform_point(contact.local_anchor1);
+            let between = pose2.transform_point(contact.local_anchor2) - pose1.transform_point(contact.local_anchor1);
             let gap = between.dot(contact.normal);
             let drift = between - contact.normal * gap;
             contact.separation = gap;

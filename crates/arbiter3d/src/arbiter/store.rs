@@ -112,11 +112,7 @@ impl Arbiter {
     /// The other body; `None` when `body` is neither.
     #[must_use]
     pub fn other_body(&self, body: BodyId) -> Option<BodyId> {
-        if body == self.body1 {
-            Some(self.body2)
-        } else {
-            (body == self.body2).then_some(self.body1)
-        }
+        if body == self.body1 { Some(self.body2) } else { (body == self.body2).then_some(self.body1) }
     }
 
     /// Whether the engine made it for two shapes, rather than a user.

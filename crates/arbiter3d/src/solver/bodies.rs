@@ -203,11 +203,7 @@ pub(crate) unsafe fn gather<const L: usize>(
 /// # Safety
 /// No other thread may touch the bodies without [`READ_ONLY`].
 #[inline(always)]
-pub(crate) unsafe fn scatter<const L: usize>(
-    states: &SharedStates<'_>,
-    bodies: &[u32; L],
-    velocity: &WideVelocity<L>,
-) {
+pub(crate) unsafe fn scatter<const L: usize>(states: &SharedStates<'_>, bodies: &[u32; L], velocity: &WideVelocity<L>) {
     for lane in 0..L {
         if bodies[lane] & READ_ONLY == 0 {
             // SAFETY: promised by the caller; the reference ends with this iteration.

@@ -118,7 +118,8 @@ impl RowPlan {
         let (a, b) = (arbiter.body1.index as usize, arbiter.body2.index as usize);
         let moves = |body: usize| {
             let mass = &bodies.masses[body];
-            mass.inverse_mass != crate::math::Vec3::ZERO || mass.inverse_inertia.xx + mass.inverse_inertia.yy + mass.inverse_inertia.zz > 0.0
+            mass.inverse_mass != crate::math::Vec3::ZERO
+                || mass.inverse_inertia.xx + mass.inverse_inertia.yy + mass.inverse_inertia.zz > 0.0
         };
         let (a_moves, b_moves) = (moves(a), moves(b));
         bodies.states[a].constrained = 1;

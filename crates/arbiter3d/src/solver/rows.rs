@@ -90,12 +90,8 @@ impl<const L: usize, const P: usize, const C: usize> NormalRow<L, P, C> {
         inverse_mass2: WideVec3::ZERO,
         inverse_inertia1: WideSymmetric::ZERO,
         inverse_inertia2: WideSymmetric::ZERO,
-        points: [NormalPoint {
-            arm1: WideVec3::ZERO,
-            arm2: WideVec3::ZERO,
-            separation: Wide::ZERO,
-            mass: Wide::ZERO,
-        }; P],
+        points: [NormalPoint { arm1: WideVec3::ZERO, arm2: WideVec3::ZERO, separation: Wide::ZERO, mass: Wide::ZERO };
+            P],
         coupling: [Wide::ZERO; C],
         impulses: [Wide::ZERO; P],
         totals: [Wide::ZERO; P],

@@ -195,9 +195,7 @@ fn normal_velocities<const L: usize, const P: usize, const C: usize>(
     v2: &WideVelocity<L>,
 ) -> [Wide<L>; P] {
     let linear = row.normal.dot(&(v2.linear - v1.linear));
-    std::array::from_fn(|i| {
-        linear + row.points[i].arm2.dot(&v2.angular) - row.points[i].arm1.dot(&v1.angular)
-    })
+    std::array::from_fn(|i| linear + row.points[i].arm2.dot(&v2.angular) - row.points[i].arm1.dot(&v1.angular))
 }
 
 /// One Gauss–Seidel sweep over the points of a row.

@@ -622,10 +622,7 @@ impl World {
             let shape = &self.shapes[slot as usize];
             inner = crate::math::min(shape.geometry.inner_radius(), inner);
             let bounds = shape.geometry.local_aabb().transform(&shape.pose);
-            let far = crate::math::max3(
-                (bounds.max - body.mass.center).abs(),
-                (bounds.min - body.mass.center).abs(),
-            );
+            let far = crate::math::max3((bounds.max - body.mass.center).abs(), (bounds.min - body.mass.center).abs());
             reach = crate::math::max(far.length(), reach);
         }
         let body = &mut self.bodies[index as usize];
@@ -652,15 +649,15 @@ impl World {
         mass.inverse_mass = if dynamic { free_linear / body.mass.mass } else { Vec3::ZERO };
         mass.rotation = body.pose.rotation;
         mass.center = body.pose.transform_point(body.mass.center);
-        mass.inverse_inertia = if dynamic {
-            world_inverse_inertia(&mass.rotation.to_mat3(), motion)
-        } else {
-            SymmetricMat3::ZERO
-        };
+        mass.inverse_inertia =
+            if dynamic { world_inverse_inertia(&mass.rotation.to_mat3(), motion) } else { SymmetricMat3::ZERO };
     }
 
     pub(crate) fn end_arbiters_of(&mut self, index: u32, reason: EndReason) {
-        while let Some(arbiter) = { let first = self.arbiters.of_body(index).next(); first } {
+        while let Some(arbiter) = {
+            let first = self.arbiters.of_body(index).next();
+            first
+        } {
             self.end_arbiter(arbiter, reason);
         }
     }

@@ -9,6 +9,7 @@
 
 use super::World;
 use super::bodies::Body;
+use super::filters::UserFilters;
 use super::pairs::Pair;
 use super::settings::WorldSettings;
 use super::shapes::ShapeSlot;
@@ -47,6 +48,7 @@ struct CollideContext<'a> {
     solver: &'a SolverBodies,
     broad_phase: &'a crate::broad_phase::BroadPhase,
     settings: &'a WorldSettings,
+    filters: &'a UserFilters,
     dt: Real,
 }
 
@@ -95,6 +97,7 @@ impl World {
             solver: &self.solver_bodies,
             broad_phase: &self.broad_phase,
             settings: &self.scaled,
+            filters: &self.filters,
             dt,
         };
         let active = &self.active_pairs;
@@ -108,8 +111,7 @@ impl World {
                 // SAFETY: each active pair stands in the list once, and only this block visits it.
                 let pair = unsafe { pairs.get_mut(index as usize) };
                 // SAFETY: an arbiter belongs to one pair.
-                let arbiter =
-                    (pair.arbiter != NONE).then(|| unsafe { arbiters.get_mut(pair.arbiter as usize) });
+                let arbiter = (pair.arbiter != NONE).then(|| unsafe { arbiters.get_mut(pair.arbiter as usize) });
                 if let Some(item) = context.collide_pair(index, pair, arbiter) {
                     found.push(item);
                 }
@@ -158,13 +160,17 @@ impl CollideContext<'_> {
         }
         let [b1, b2] = pair.bodies.map(|body| &self.bodies[body as usize]);
         let relative = b1.pose.relative(&b2.pose);
-        if pair.has_manifold && !pair.sensor && self.hardly_moved(pair, &relative, s1, s2) {
+        let reusable = pair.has_manifold && !pair.sensor && self.filters.contact.is_none();
+        if reusable && self.hardly_moved(pair, &relative, s1, s2) {
             return None;
         }
         let margin = if pair.sensor { 0.0 } else { self.margin(pair, s1, s2) };
         let mut manifold = Manifold::EMPTY;
         let shapes_relative = s1.pose.inverse().mul(&relative.mul(&s2.pose));
         collide(&s1.geometry, &s2.geometry, &shapes_relative, margin, &mut pair.cache, &mut manifold);
+        if !self.filters.passes_contact(pair, (self.shapes, self.bodies), &mut manifold) {
+            manifold.clear();
+        }
         if pair.sensor {
             let overlaps = !manifold.points().is_empty();
             return (overlaps != pair.overlapping).then_some(News::Sensor(index, overlaps));
@@ -194,8 +200,6 @@ impl CollideContext<'_> {
         let old = &pair.manifold_pose;
         let moved = relative.position - old.position;
         let turned = old.rotation.conjugate().mul(relative.rotation).vector();
-        let reach = max(self.bodies[pair.bodies[0] as usize].reach, 0.0);
-        let _ = reach;
         moved.length_squared() < limit * limit && turned.length_squared() < REUSE_ROTATION * REUSE_ROTATION
     }
 

@@ -7,6 +7,7 @@ mod continuous;
 mod definition;
 pub(crate) mod error;
 mod events;
+mod filters;
 mod id;
 mod numbers;
 mod pairs;
@@ -22,6 +23,7 @@ pub use bodies::{BodyMut, BodyRef};
 pub use definition::{BodyDefinition, BodyKind, CombineRule, Filter, LockedAxes, Material, ShapeDefinition};
 pub use error::{Error, UNIT_TOLERANCE};
 pub use events::{BeginEvent, BeginListener, ContactProvider, EndEvent, EndListener, SensorEvent, StepContext};
+pub use filters::{ContactFilter, PairFilter, ShapePair};
 pub use id::{BodyId, ShapeId};
 pub use queries::{QueryFilter, RayHit};
 pub use settings::WorldSettings;
@@ -86,6 +88,7 @@ pub struct World {
     pool: StagePool,
     events: events::Events,
     listeners: events::Listeners,
+    filters: filters::UserFilters,
     providers: Vec<Box<dyn ContactProvider>>,
     removals: Vec<events::Removal>,
     timings: Timings,
@@ -152,6 +155,7 @@ impl World {
             pool: StagePool::new(settings.threads),
             events: events::Events::default(),
             listeners: events::Listeners::default(),
+            filters: filters::UserFilters::default(),
             providers: Vec::new(),
             removals: Vec::new(),
             timings: Timings::default(),

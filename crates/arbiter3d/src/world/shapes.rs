@@ -308,7 +308,8 @@ impl World {
     /// Takes a shape out of the broad phase with all its pairs.
     pub(crate) fn remove_proxy(&mut self, slot: u32, reason: EndReason) {
         let body = self.shapes[slot as usize].body;
-        let pairs: Vec<u32> = self.pairs_of_body(body).filter(|&pair| self.pairs[pair as usize].has_shape(slot)).collect();
+        let pairs: Vec<u32> =
+            self.pairs_of_body(body).filter(|&pair| self.pairs[pair as usize].has_shape(slot)).collect();
         for pair in pairs {
             self.remove_pair(pair, reason);
         }
