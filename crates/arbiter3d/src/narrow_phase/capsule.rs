@@ -1,23 +1,25 @@
 //! Capsules against capsules, cuboids and hulls.
 //!
-//! Two capsules meet where their segments are closest (Ericson, "Real-Time Collision Detection", 2005, section 5.1.9). Near
-//! parallel, the two ends of the stretch that they share carry the contact.
+//! Two capsules meet where their segments are closest (Ericson, "Real-Time Collision Detection", 2005, section 5.1.9).
+//! Near parallel, the two ends of the stretch that they share carry the contact.
 //!
-//! Against a polyhedron, the closest points of the segment give the normal while the segment is outside; inside, the faces and
-//! the cross products of its edges with the segment are tried for the direction of least overlap. If the normal is (nearly) that of a
-//! face, the stretch of the segment over that face gives two points.
+//! Against a polyhedron, the closest points of the segment give the normal while the segment is outside; inside, the
+//! faces and the cross products of its edges with the segment are tried for the direction of least overlap. If the
+//! normal is (nearly) that of a face, the stretch of the segment over that face gives two points.
 
-use super::distance::{Support, closest};
+use super::distance::{Closest, Support, closest};
 use super::polyhedron::{CuboidFeatures, Polyhedron};
 use super::sphere::{any_perpendicular, push_rounded};
 use super::{Manifold, ManifoldPoint};
 use crate::math::{Pose, Real, Vec3, clamp, max, min, normalize_or};
-use crate::shape::{Capsule, Cuboid};
+use crate::shape::{Capsule, ConvexHull, Cuboid};
 
 /// Segments whose angle has a sine below this are parallel: two points.
 const PARALLEL_SINE: Real = 0.05;
 /// A normal with a cosine above this to a face is taken to be that face's.
 const FACE_COSINE: Real = 0.998;
+/// A face stands in for the closest points if it is at most this share of the smaller size less deep.
+const FACE_LOSS: Real = 0.01;
 /// An edge must overlap less than the best face by this share of the smaller size to make the contact.
 const EDGE_BIAS: Real = 5e-3;
 
@@ -64,6 +66,11 @@ pub(crate) fn cuboid_capsule(a: &Cuboid, b: &Capsule, pose: &Pose, margin: Real,
     polyhedron_capsule(&features.view(), &Support::Cuboid(*a), b, pose, (margin, manifold));
 }
 
+/// Hull (shape 1) against capsule.
+pub(crate) fn hull_capsule(a: &ConvexHull, b: &Capsule, pose: &Pose, margin: Real, manifold: &mut Manifold) {
+    polyhedron_capsule(&Polyhedron::from_hull(a), &Support::Hull(a), b, pose, (margin, manifold));
+}
+
 /// A capsule beside a polyhedron, in the frame of the latter.
 struct CapsulePair<'a> {
     polyhedron: &'a Polyhedron<'a>,
@@ -74,7 +81,7 @@ struct CapsulePair<'a> {
 }
 
 /// Polyhedron (shape 1, `support` its support map) against capsule.
-pub(crate) fn polyhedron_capsule(
+fn polyhedron_capsule(
     polyhedron: &Polyhedron,
     support: &Support,
     capsule: &Capsule,
@@ -93,15 +100,10 @@ pub(crate) fn polyhedron_capsule(
         if c.distance > pair.radius + margin {
             return;
         }
-        let along = polyhedron.face_along(c.normal);
-        if polyhedron.planes[along].normal.dot(c.normal) > FACE_COSINE && pair.face_contact(along, manifold) {
-            return;
-        }
-        let separation = c.distance - pair.radius;
-        manifold.push(ManifoldPoint { point1: c.point1, normal: c.normal, separation, feature: 0 });
+        pair.outside_contact(&c, manifold);
         return;
     }
-    let size = min(polyhedron.inner_radius, pair.radius);
+    let size = min(polyhedron.size, pair.radius);
     match pair.best_edge(gap + EDGE_BIAS * size) {
         Some(edge) => pair.edge_contact(edge, manifold),
         None if pair.face_contact(face, manifold) => {}
@@ -110,6 +112,24 @@ pub(crate) fn polyhedron_capsule(
 }
 
 impl CapsulePair<'_> {
+    /// The segment is outside: the face that the normal is almost that of, or the closest points.
+    fn outside_contact(&self, c: &Closest, manifold: &mut Manifold) {
+        let separation = c.distance - self.radius;
+        let face = self.polyhedron.face_along(c.normal);
+        if self.polyhedron.planes[face].normal.dot(c.normal) > FACE_COSINE && self.face_contact(face, manifold) {
+            // Beside an edge the stretch over the face can leave out the closest point.
+            let allowed = separation + FACE_LOSS * min(self.polyhedron.size, self.radius);
+            if manifold.points().iter().any(|p| p.separation <= allowed) {
+                return;
+            }
+            manifold.clear();
+        }
+        if self.parallel_edge_contact(face, c, manifold) {
+            return;
+        }
+        manifold.push(ManifoldPoint { point1: c.point1, normal: c.normal, separation, feature: 0 });
+    }
+
     /// The face furthest from the segment, and how far its nearer end is (negative inside).
     fn best_face(&self) -> (usize, Real) {
         let (mut face, mut best) = (0, -Real::MAX);
@@ -124,7 +144,8 @@ impl CapsulePair<'_> {
 
     /// The edge whose cross product with the segment has the largest gap, if that is above `floor`, and its normal.
     ///
-    /// Only where the segment's directions cross the arc between the normals of the two faces can the product be a support.
+    /// Only where the segment's directions cross the arc between the normals of the two faces can the product be a
+    /// support.
     fn best_edge(&self, floor: Real) -> Option<(usize, Vec3)> {
         let direction = self.ends[1] - self.ends[0];
         let mut best = floor;
@@ -137,7 +158,11 @@ impl CapsulePair<'_> {
                 continue;
             }
             let (a, b) = self.polyhedron.edge_points(edge);
-            let axis = normalize_or((b - a).cross(direction), n1);
+            let cross = (b - a).cross(direction);
+            if cross.length_squared() < 1e-5 * (b - a).length_squared() * direction.length_squared() {
+                continue; // Parallel: the faces beside the edge stand in.
+            }
+            let axis = normalize_or(cross, n1);
             let axis = if axis.dot(n1 + n2) < 0.0 { -axis } else { axis };
             let gap = axis.dot(self.ends[0] - a);
             if gap > best {
@@ -183,6 +208,44 @@ impl CapsulePair<'_> {
             }
         }
         !manifold.points().is_empty()
+    }
+
+    /// The ends of the stretch of the segment along an edge of `face` that runs beside it and holds the closest point;
+    /// false if there is no such edge.
+    fn parallel_edge_contact(&self, face: usize, c: &Closest, manifold: &mut Manifold) -> bool {
+        let way = self.ends[1] - self.ends[0];
+        let squared = way.length_squared();
+        if c.normal.dot(way).abs() > PARALLEL_SINE * squared.sqrt() {
+            return false;
+        }
+        let nearness = FACE_LOSS * min(self.polyhedron.size, self.radius);
+        for edge in self.polyhedron.face_loop(face) {
+            let (a, b) = self.polyhedron.edge_points(edge);
+            let along = b - a;
+            let length_squared = along.length_squared();
+            let sine_squared = PARALLEL_SINE * PARALLEL_SINE * squared * length_squared;
+            let off = (c.point1 - a).cross(along).length_squared();
+            if along.cross(way).length_squared() > sine_squared || off > nearness * nearness * length_squared {
+                continue;
+            }
+            // Both as multiples of the edge.
+            let [p, q] = self.ends.map(|end| (end - a).dot(along) / length_squared);
+            let (low, high) = (max(min(p, q), 0.0), min(max(p, q), 1.0));
+            if high - low < 1e-2 {
+                continue;
+            }
+            for (end, s) in [(0, low), (1, high)] {
+                let point1 = a + along * s;
+                let core = self.ends[0] + way * clamp((s - p) / (q - p), 0.0, 1.0);
+                let separation = c.normal.dot(core - point1) - self.radius;
+                if separation <= self.margin {
+                    let feature = 0x1000_0000 | (edge as u32) << 1 | end;
+                    manifold.push(ManifoldPoint { point1, normal: c.normal, separation, feature });
+                }
+            }
+            return !manifold.points().is_empty();
+        }
+        false
     }
 
     /// Closest points of the segment and an edge of the polyhedron.

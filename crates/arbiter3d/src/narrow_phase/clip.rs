@@ -1,11 +1,12 @@
 //! Clipping of a face against the side planes of another, and the choice of the four points that carry a contact best.
 //!
-//! Clipping is Sutherland and Hodgman's ("Reentrant polygon clipping", 1974): each plane cuts the polygon into one with at most
-//! one more corner. The choice keeps the deepest point, then adds the one farthest from it, the one that makes the largest
-//! triangle and the one that adds most area to it. Equal candidates go to the lowest index, and a candidate must win by a
-//! relative [`TIE`], so that rounding does not make a resting contact jump from one equal choice to the next.
+//! Clipping is Sutherland and Hodgman's ("Reentrant polygon clipping", 1974): each plane cuts the polygon into one
+//! with at most one more corner. The choice keeps the deepest point, then adds the one farthest from it, the one that
+//! makes the largest triangle and the one that adds most area to it. Equal candidates go to the lowest index, and a
+//! candidate must win by a relative [`TIE`], so that rounding does not make a resting contact jump from one equal
+//! choice to the next.
 
-use crate::math::{Real, Vec3};
+use crate::math::{Real, Vec3, max, min, tangents};
 
 /// A candidate must beat the best so far by this share: the eight points of two crossed boxes stay where they are.
 const TIE: Real = 1e-3;
@@ -24,7 +25,8 @@ pub(crate) struct ClipPoint {
 /// Cuts the polygon by `normal · x <= offset`; `features` names the corners that the cut makes.
 ///
 /// `feature` of a corner made on the edge that leaves corner `c` is `(c.feature << 12) ^ cut`, with the top bit telling
-/// which way the edge crosses. Returns the new count; `output` needs room for one more corner than `input`.
+/// which way the edge crosses. Returns the new count; `output` needs room for one more corner than `input`: only a
+/// polygon that rounding has bent inwards could make more, and those are left out.
 pub(crate) fn clip_polygon(input: &[ClipPoint], plane: (Vec3, Real), cut: u32, output: &mut [ClipPoint]) -> usize {
     let Some(last) = input.last() else { return 0 };
     let mut count = 0;
@@ -32,7 +34,7 @@ pub(crate) fn clip_polygon(input: &[ClipPoint], plane: (Vec3, Real), cut: u32, o
     let mut previous_distance = plane.0.dot(previous.position) - plane.1;
     for &current in input {
         let distance = plane.0.dot(current.position) - plane.1;
-        if (previous_distance <= 0.0) != (distance <= 0.0) {
+        if (previous_distance <= 0.0) != (distance <= 0.0) && count < output.len() {
             let t = previous_distance / (previous_distance - distance);
             let direction = if distance <= 0.0 { 0x8000_0000 } else { 0 };
             output[count] = ClipPoint {
@@ -42,7 +44,7 @@ pub(crate) fn clip_polygon(input: &[ClipPoint], plane: (Vec3, Real), cut: u32, o
             };
             count += 1;
         }
-        if distance <= 0.0 {
+        if distance <= 0.0 && count < output.len() {
             output[count] = current;
             count += 1;
         }
@@ -53,28 +55,43 @@ pub(crate) fn clip_polygon(input: &[ClipPoint], plane: (Vec3, Real), cut: u32, o
 
 /// Chooses at most four of the points (on a plane with `normal`): their indices and how many.
 ///
-/// `size` is a length of the shapes: points less deep than the deepest by under a ten thousandth of it count as deepest.
+/// `size` is a length of the shapes: points less deep than the deepest by under a ten thousandth of it count as
+/// deepest.
+#[inline(always)]
 pub(crate) fn reduce(points: &[ClipPoint], normal: Vec3, size: Real) -> ([usize; 4], usize) {
     if points.len() <= 4 {
         return ([0, 1, 2, 3], points.len());
     }
-    let a = deepest(points, 1e-4 * size);
-    let pa = points[a].position;
-    let b = best(points, |p| (p - pa).length_squared());
-    let ab = points[b].position - pa;
-    let side = ab.cross(normal);
-    let c = best(points, |p| (p - pa).dot(side).abs());
-    // Wind a, b, c counter-clockwise as seen against the normal; a point outside adds the triangle over the edge it is beyond.
-    let (b, c) = if (points[c].position - pa).dot(side) < 0.0 { (b, c) } else { (c, b) };
-    let (pb, pc) = (points[b].position, points[c].position);
-    let sides = [(pa, (pb - pa).cross(normal)), (pb, (pc - pb).cross(normal)), (pc, (pa - pc).cross(normal))];
-    let gain = |p: Vec3| {
-        sides.iter().fold(0.0, |g, (origin, out)| {
-            let area = (p - *origin).dot(*out);
-            if area > g { area } else { g }
-        })
+    let (u, v) = tangents(normal);
+    let flat = |i: usize| (points[i].position.dot(u), points[i].position.dot(v));
+    choose_four(points.len(), flat, |i| points[i].separation, size)
+}
+
+/// [`reduce`] for five or more points in the coordinates of their plane.
+#[inline(always)]
+pub(crate) fn choose_four(
+    count: usize,
+    position: impl Fn(usize) -> (Real, Real),
+    separation: impl Fn(usize) -> Real,
+    size: Real,
+) -> ([usize; 4], usize) {
+    let lowest = (0..count).fold(Real::MAX, |m, i| min(separation(i), m));
+    let a = (0..count).position(|i| separation(i) <= lowest + 1e-4 * size).unwrap_or(0);
+    let (ax, ay) = position(a);
+    let b = best(count, |i| {
+        let (x, y) = position(i);
+        (x - ax) * (x - ax) + (y - ay) * (y - ay)
+    });
+    let beyond = |i: usize, (px, py): (Real, Real), (qx, qy): (Real, Real)| {
+        let (x, y) = position(i);
+        (x - px) * (qy - py) - (y - py) * (qx - px)
     };
-    let d = best(points, gain);
+    let (pa, pb) = ((ax, ay), position(b));
+    let c = best(count, |i| beyond(i, pa, pb).abs());
+    // Wind a, b, c so that what is inside is not beyond; a point outside adds the triangle over the side that it is
+    // beyond.
+    let (pb, pc) = if beyond(c, pa, pb) < 0.0 { (pb, position(c)) } else { (position(c), pb) };
+    let d = best(count, |i| max(max(beyond(i, pa, pb), beyond(i, pb, pc)), max(beyond(i, pc, pa), 0.0)));
     // Points that coincide give no length or area, and are found twice: drop them.
     let mut chosen = ([a, 0, 0, 0], 1);
     for index in [b, c, d] {
@@ -86,20 +103,16 @@ pub(crate) fn reduce(points: &[ClipPoint], normal: Vec3, size: Real) -> ([usize;
     chosen
 }
 
-/// The first point that is within `tolerance` of the deepest.
-fn deepest(points: &[ClipPoint], tolerance: Real) -> usize {
-    let lowest = points.iter().fold(Real::MAX, |m, p| if p.separation < m { p.separation } else { m });
-    points.iter().position(|p| p.separation <= lowest + tolerance).unwrap_or(0)
-}
-
-/// The point with the largest score; the lowest index of those that are equal.
-fn best(points: &[ClipPoint], score: impl Fn(Vec3) -> Real) -> usize {
-    let (mut index, mut highest) = (0, score(points[0].position));
-    for (i, point) in points.iter().enumerate().skip(1) {
-        let s = score(point.position);
-        if s > highest * (1.0 + TIE) {
-            (index, highest) = (i, s);
-        }
+/// The index with the largest score; the lowest of those that are equal.
+#[inline(always)]
+fn best(count: usize, score: impl Fn(usize) -> Real) -> usize {
+    // Selects, not branches: which of eight equal corners is a hair farther cannot be foretold.
+    let (mut index, mut floor) = (0, score(0) * (1.0 + TIE));
+    for i in 1..count {
+        let s = score(i);
+        let wins = s > floor;
+        index = std::hint::select_unpredictable(wins, i, index);
+        floor = std::hint::select_unpredictable(wins, s * (1.0 + TIE), floor);
     }
     index
 }

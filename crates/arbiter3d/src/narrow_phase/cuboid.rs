@@ -1,7 +1,7 @@
 //! Cuboid against cuboid: the separating axis test on its fifteen axes, then one face clipped against another.
 //!
-//! With the axes of box 2 as columns of `C` in the frame of box 1, `A = |C|`, centre distance `t` and half extents `a`, `b`,
-//! the signed gaps along the candidate axes are (Gottschalk, Lin, Manocha, "OBBTree", 1996)
+//! With the axes of box 2 as columns of `C` in the frame of box 1, `A = |C|`, centre distance `t` and half extents
+//! `a`, `b`, the signed gaps along the candidate axes are (Gottschalk, Lin, Manocha, "OBBTree", 1996)
 //!
 //! ```text
 //! face i of box 1   |t_i| − a_i − Σ_j A_ij b_j
@@ -9,29 +9,40 @@
 //! edges i × j       (|t · (e_i × c_j)| − reach of both) / √(1 − C_ij²)
 //! ```
 //!
-//! The largest gap tells the direction of least overlap. Faces of box 1 win over those of box 2, and faces over edges, unless the
-//! other is better by a share of the smaller box ([`FACE_BIAS`], [`EDGE_BIAS`]): a face gives up to four points, an edge pair
-//! only one, and the choice must not change from step to step in a resting stack.
+//! The largest gap tells the direction of least overlap. The choice must not change from step to step in a resting
+//! stack: faces of box 1 win over those of box 2 unless these are better by a share of the smaller box
+//! ([`FACE_BIAS`]). An edge pair whose axis is almost a face normal, as in every stack that leans by a hair, has to
+//! beat the face as clipped by [`EDGE_BIAS`], since the face gives up to four points and the edges only one. At other
+//! angles edges win at once: a face would push the wrong way.
 //!
-//! A face contact is found without walking polygons: each edge of the incident face is cut by the rectangle of the reference
-//! face (Liang, Barsky, "A new concept and method for line clipping", 1984), four edges side by side, and the corners of the
-//! rectangle that lie over the incident face are added. The rectangle is grown by [`GROWTH`] so that corners that lie on its
-//! border, as in every tidy stack, count as inside and keep their feature.
+//! A face contact is found without walking polygons: each edge of the incident face is cut by the rectangle of the
+//! reference face (Liang, Barsky, "A new concept and method for line clipping", 1984), four edges side by side, and
+//! the corners of the rectangle that lie over the incident face are added. The rectangle is grown by [`GROWTH`] so
+//! that corners that lie on its border, as in every tidy stack, count as inside and keep their feature.
 
-use super::clip::{ClipPoint, reduce};
+use super::clip::choose_four;
 use super::distance::{Support, closest};
+use super::polyhedron::cuboid_size;
 use super::{Manifold, ManifoldPoint, PairCache};
 use crate::math::{Mat3, Pose, Real, Vec3, clamp, max, min};
 use crate::shape::Cuboid;
 
-/// A face of box 2 is the reference when it is better by this share of the smallest half extent.
+/// A face of box 2 is the reference when it is better by this share of the smaller box's [`cuboid_size`].
 const FACE_BIAS: Real = 2e-3;
-/// An edge pair makes the contact when it is better by this share of the smallest half extent.
-const EDGE_BIAS: Real = 5e-3;
+/// An edge pair is looked at when it is better than the best face by this share of the smaller box's [`cuboid_size`].
+const EDGE_GAIN: Real = 2e-4;
+/// Along a face normal, an edge pair makes the contact when the clipped face is deeper by this share of the smaller
+/// box's [`cuboid_size`].
+pub(super) const EDGE_BIAS: Real = 5e-3;
+/// Cosine above which the axis of an edge pair is taken to be along a face normal (11°).
+pub(super) const ALIGNED: Real = 0.98;
 /// Share by which the reference rectangle is grown.
 const GROWTH: Real = 1e-4;
 /// Edges with `sin² ` of their angle below this are parallel: the face axes stand in for their cross product.
 const PARALLEL: Real = 1e-5;
+
+/// The corners of a face, in turn, as multiples of its two half sides.
+const SIGNS: [(Real, Real); 4] = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)];
 
 /// Two boxes, told in the frame of the first.
 struct Boxes {
@@ -61,20 +72,36 @@ pub(crate) fn cuboid_cuboid(
     if (1..=15).contains(&cached) && boxes.gap(cached - 1) > margin {
         return;
     }
-    let size = min(cuboid1.half_extents().min_element(), cuboid2.half_extents().min_element());
-    let best = boxes.best_axis(margin, size);
-    cache.words[0] = best.axis as u32 + 1;
-    if best.gap > margin {
+    let size = min(cuboid_size(cuboid1.half_extents()), cuboid_size(cuboid2.half_extents()));
+    let face = boxes.best_face(margin, size);
+    cache.words[0] = face.axis as u32 + 1;
+    if face.gap > margin {
         return;
     }
-    if best.axis >= 6 {
-        boxes.edge_contact(best.axis - 6, manifold);
-        return;
+    let edge = boxes.best_edge(face.gap + EDGE_GAIN * size);
+    if let Some(edge) = edge {
+        cache.words[0] = edge.axis as u32 + 1;
+        if edge.gap > margin {
+            return;
+        }
     }
-    boxes.face_contact(best.axis, &m, (margin, size), manifold);
+    if edge.is_none_or(|edge| boxes.cosine(edge.axis - 6, face.axis) > ALIGNED) {
+        boxes.face_contact(face.axis, &m, (margin, size), manifold);
+    }
+    if let Some(edge) = edge
+        && !stands_in(manifold, edge.gap - EDGE_BIAS * size)
+    {
+        manifold.clear();
+        boxes.edge_contact(edge.axis - 6, manifold);
+    }
     if manifold.points().is_empty() {
-        passing_by(cuboid1, cuboid2, pose, (margin, best.gap, best.axis), manifold);
+        passing_by(cuboid1, cuboid2, pose, (margin, face.gap, face.axis), manifold);
     }
+}
+
+/// Whether a face contact is there and nowhere deeper than `depth`.
+pub(super) fn stands_in(manifold: &Manifold, depth: Real) -> bool {
+    !manifold.points().is_empty() && manifold.points().iter().all(|p| p.separation >= depth)
 }
 
 /// Boxes that pass each other with no corner over the other's face: the closest points, or the deepest corner.
@@ -172,9 +199,9 @@ impl Boxes {
         }
     }
 
-    /// The axis to build the contact on, or one along which the boxes are apart by more than `margin`.
+    /// The face to build the contact on, or one along which the boxes are apart by more than `margin`.
     #[inline(always)]
-    fn best_axis(&self, margin: Real, size: Real) -> Axis {
+    fn best_face(&self, margin: Real, size: Real) -> Axis {
         let mut best = Axis { axis: 0, gap: self.face1_gap(0) };
         for i in 1..3 {
             let gap = self.face1_gap(i);
@@ -192,20 +219,13 @@ impl Boxes {
                 other = Axis { axis: 3 + j, gap };
             }
         }
-        if other.gap > margin || other.gap > best.gap + FACE_BIAS * size {
-            best = other;
-        }
-        if best.gap > margin {
-            return best;
-        }
-        self.best_edge(best, EDGE_BIAS * size)
+        if other.gap > margin || other.gap > best.gap + FACE_BIAS * size { other } else { best }
     }
 
-    /// The best edge pair if it beats `face` by `bias`.
+    /// The edge pair with the largest gap, if that is above `floor`.
     #[inline(always)]
-    fn best_edge(&self, face: Axis, bias: Real) -> Axis {
-        let floor = face.gap + bias;
-        let mut best = Axis { axis: face.axis, gap: floor };
+    fn best_edge(&self, floor: Real) -> Option<Axis> {
+        let mut best = Axis { axis: 0, gap: floor };
         for i in 0..3 {
             for j in 0..3 {
                 let gap = self.edge_gap(i, j);
@@ -220,42 +240,45 @@ impl Boxes {
                 }
             }
         }
-        if best.axis == face.axis { face } else { best }
+        (best.axis != 0).then_some(best)
+    }
+
+    /// Cosine of the angle between the axis of an edge pair and that of a face, never negative.
+    fn cosine(&self, pair: usize, face: usize) -> Real {
+        let (i, j) = (pair / 3, pair % 3);
+        // `e_i × c_j` has no part along `e_i`, and along another axis the coordinate of `c_j` on the third; so for box
+        // 2.
+        let part = match face {
+            k @ 0..=2 if k != i => self.c[3 - i - k][j],
+            k @ 3..=5 if k - 3 != j => self.c[i][6 - j - k],
+            _ => 0.0,
+        };
+        part.abs() / self.edge_length_squared(i, j).sqrt()
     }
 
     /// Clips the incident face against the reference face.
     #[inline(always)]
-    fn face_contact(&self, axis: usize, m: &Mat3, (margin, size): (Real, Real), manifold: &mut Manifold) {
-        let t = Vec3::from_array(self.t);
-        let mut points = [ClipPoint::default(); 12];
+    fn face_contact(&self, axis: usize, m: &Mat3, reach: (Real, Real), manifold: &mut Manifold) {
         if axis < 3 {
-            let face = FacePair::new(&self.a, &self.b, &self.c, &self.t, axis);
-            let count = face.clip(margin, &mut points);
-            let normal = face.normal();
-            let (chosen, count) = reduce(&points[..count], normal, size);
-            for &k in &chosen[..count] {
-                let p = &points[k];
-                let point1 = p.position - normal * p.separation;
-                manifold.push(ManifoldPoint { point1, normal, separation: p.separation, feature: p.feature });
-            }
-        } else {
-            let c = &self.c;
-            let transposed = [[c[0][0], c[1][0], c[2][0]], [c[0][1], c[1][1], c[2][1]], [c[0][2], c[1][2], c[2][2]]];
-            let back = |j: usize| -(c[0][j] * self.t[0] + c[1][j] * self.t[1] + c[2][j] * self.t[2]);
-            let face = FacePair::new(&self.b, &self.a, &transposed, &[back(0), back(1), back(2)], axis - 3);
-            let count = face.clip(margin, &mut points);
-            let normal2 = face.normal();
-            let normal = -(*m * normal2);
-            let (chosen, count) = reduce(&points[..count], normal2, size);
-            for &k in &chosen[..count] {
-                let p = &points[k];
-                let feature = p.feature | 0x1000;
-                manifold.push(ManifoldPoint { point1: *m * p.position + t, normal, separation: p.separation, feature });
-            }
+            FacePair::new(&self.a, &self.b, &self.c, &self.t, axis).contact(reach, manifold);
+            return;
+        }
+        let (c, t) = (&self.c, Vec3::from_array(self.t));
+        let transposed = [[c[0][0], c[1][0], c[2][0]], [c[0][1], c[1][1], c[2][1]], [c[0][2], c[1][2], c[2][2]]];
+        let back = |j: usize| -(c[0][j] * self.t[0] + c[1][j] * self.t[1] + c[2][j] * self.t[2]);
+        let face = FacePair::new(&self.b, &self.a, &transposed, &[back(0), back(1), back(2)], axis - 3);
+        face.contact(reach, manifold);
+        // Found in the frame of box 2 with the roles swapped.
+        let normal = -(*m * face.normal());
+        for p in manifold.points_mut() {
+            p.point1 = *m * p.point2() + t;
+            p.normal = normal;
+            p.feature |= 0x1000;
         }
     }
 
-    /// The closest points of one edge of each box.
+    /// The closest points of one edge of each box; nothing if the boxes are apart and the edges are closest beyond
+    /// their ends.
     fn edge_contact(&self, pair: usize, manifold: &mut Manifold) {
         let (i, j) = (pair / 3, pair % 3);
         let column = |k: usize| Vec3::new(self.c[0][k], self.c[1][k], self.c[2][k]);
@@ -278,8 +301,14 @@ impl Boxes {
         let w = p2 - p1;
         let cosine = self.c[i][j];
         let (along1, along2) = (w[i], w.dot(d2));
-        let s = clamp((along1 - cosine * along2) / self.edge_length_squared(i, j), -self.a[i], self.a[i]);
-        manifold.push(ManifoldPoint { point1: p1 + d1 * s, normal, separation: w.dot(normal), feature });
+        let squared = self.edge_length_squared(i, j);
+        let (s, t) = ((along1 - cosine * along2) / squared, (cosine * along1 - along2) / squared);
+        let separation = w.dot(normal);
+        if separation > 0.0 && (s.abs() > self.a[i] || t.abs() > self.b[j]) {
+            return;
+        }
+        let point1 = p1 + d1 * clamp(s, -self.a[i], self.a[i]);
+        manifold.push(ManifoldPoint { point1, normal, separation, feature });
     }
 }
 
@@ -299,6 +328,19 @@ struct FacePair {
     p: [Real; 3],
     q: [Real; 3],
     feature: u32,
+}
+
+/// Corners of a clipped face: coordinates in the reference rectangle and height over it.
+///
+/// There are at most eight, but rounding might find one twice: hence room for all twelve candidates, and for an index
+/// of four bits, which needs no check. Arrays a coordinate, so that what was written by ones is read by ones.
+#[derive(Default)]
+struct Patch {
+    x: [Real; 16],
+    y: [Real; 16],
+    height: [Real; 16],
+    feature: [u32; 16],
+    count: usize,
 }
 
 impl FacePair {
@@ -339,65 +381,77 @@ impl FacePair {
         normal
     }
 
-    /// Rectangle coordinates and height to the frame of the reference box.
+    /// Up to four points, in the frame of the reference box.
     #[inline(always)]
-    fn place(&self, x: Real, y: Real, height: Real) -> Vec3 {
-        let mut point = [0.0; 3];
-        point[(self.k + 1) % 3] = x;
-        point[(self.k + 2) % 3] = y;
-        point[self.k] = self.sign * (self.offset + height);
-        Vec3::from_array(point)
+    fn contact(&self, (margin, size): (Real, Real), manifold: &mut Manifold) {
+        let mut patch = Patch::default();
+        self.clip(margin, &mut patch);
+        let (chosen, count) = if patch.count <= 4 {
+            ([0, 1, 2, 3], patch.count)
+        } else {
+            choose_four(patch.count, |i| (patch.x[i], patch.y[i]), |i| patch.height[i], size)
+        };
+        let normal = self.normal();
+        let (u, v, origin) = (Vec3::AXES[(self.k + 1) % 3], Vec3::AXES[(self.k + 2) % 3], normal * self.offset);
+        for &k in &chosen[..count] {
+            let point1 = origin + u * patch.x[k] + v * patch.y[k];
+            manifold.push(ManifoldPoint { point1, normal, separation: patch.height[k], feature: patch.feature[k] });
+        }
     }
 
     /// The corners of the incident face seen through the reference rectangle that are not further than `margin`.
+    ///
+    /// All twelve candidates are written, each over the last one if that did not count.
     #[inline(always)]
-    fn clip(&self, margin: Real, points: &mut [ClipPoint; 12]) -> usize {
+    fn clip(&self, margin: Real, patch: &mut Patch) {
         let (m, p, q, r) = (&self.center, &self.p, &self.q, &self.rectangle);
-        // Corner e of the incident face, and the way to corner e + 1.
-        const SIDES: [(Real, Real); 4] = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)];
-        let corner: [[Real; 4]; 3] = std::array::from_fn(|x| SIDES.map(|(a, b)| m[x] + a * p[x] + b * q[x]));
-        let way: [[Real; 4]; 3] = std::array::from_fn(|x| [-2.0 * p[x], -2.0 * q[x], 2.0 * p[x], 2.0 * q[x]]);
+        let (corner, way) = self.sides();
         let (mut enter, mut leave) = ([0.0; 4], [1.0; 4]);
         for x in 0..2 {
             for e in 0..4 {
-                // A side along the border divides by zero: infinities keep or drop it, and `0 / 0` (on the border) is ignored
-                // by the order of the arguments of `min` and `max`.
-                let inverse = 1.0 / way[x][e];
+                // A side along the border may not divide by zero: a tiny slope keeps it inside or throws it far out.
+                let inverse = 1.0 / if way[x][e] == 0.0 { 1e-30 } else { way[x][e] };
                 let (low, high) = ((-r[x] - corner[x][e]) * inverse, (r[x] - corner[x][e]) * inverse);
-                let (first, second) = if low < high { (low, high) } else { (high, low) };
-                enter[e] = max(first, enter[e]);
-                leave[e] = min(second, leave[e]);
+                enter[e] = max(min(low, high), enter[e]);
+                leave[e] = min(max(high, low), leave[e]);
             }
         }
-        let mut count = 0;
-        let mut push = |x: Real, y: Real, height: Real, feature: u32| {
-            if height <= margin && count < 12 {
-                let feature = self.feature | feature;
-                points[count] = ClipPoint { position: self.place(x, y, height), separation: height, feature };
-                count += 1;
-            }
+        let mut push = |x: Real, y: Real, height: Real, feature: u32, valid: bool| {
+            let i = patch.count & 15;
+            (patch.x[i], patch.y[i], patch.height[i]) = (x, y, height);
+            patch.feature[i] = self.feature | feature;
+            patch.count += (valid & (height <= margin)) as usize;
         };
         for e in 0..4 {
-            if enter[e] <= leave[e] {
-                let at = |t: Real| [0, 1, 2].map(|x: usize| corner[x][e] + way[x][e] * t);
-                let [x, y, z] = at(enter[e]);
-                push(x, y, z, (e as u32) << 2 | (enter[e] > 0.0) as u32);
-                if leave[e] < 1.0 && enter[e] < leave[e] {
-                    let [x, y, z] = at(leave[e]);
-                    push(x, y, z, (e as u32) << 2 | 2);
-                }
-            }
+            let (t, u) = (enter[e], leave[e]);
+            let at = |x: usize, t: Real| corner[x][e] + way[x][e] * t;
+            push(at(0, t), at(1, t), at(2, t), (e as u32) << 2 | (t > 0.0) as u32, t <= u);
+            push(at(0, u), at(1, u), at(2, u), (e as u32) << 2 | 2, (t < u) & (u < 1.0));
         }
         // Corners of the rectangle over the incident face: solve `s p + t q = corner − m` by Cramer's rule.
         let area = p[0] * q[1] - p[1] * q[0];
-        for (e, (a, b)) in SIDES.into_iter().enumerate() {
+        let (s_slope, t_slope) = (p[2] / area, q[2] / area);
+        for (e, (a, b)) in SIGNS.into_iter().enumerate() {
             let (x, y) = (a * r[0] - m[0], b * r[1] - m[1]);
             let (s, t) = (x * q[1] - y * q[0], p[0] * y - p[1] * x);
-            if s.abs() < area.abs() && t.abs() < area.abs() {
-                let height = m[2] + (s * p[2] + t * q[2]) / area;
-                push(a * r[0], b * r[1], height, 16 | (e as u32) << 2);
-            }
+            let height = m[2] + (s * s_slope + t * t_slope);
+            let over = (s.abs() < area.abs()) & (t.abs() < area.abs());
+            push(a * r[0], b * r[1], height, 16 | (e as u32) << 2, over);
         }
-        count
+    }
+
+    /// The corners of the incident face, and from each the way to the next: two coordinates in the rectangle, then the
+    /// height.
+    #[inline(always)]
+    fn sides(&self) -> ([[Real; 4]; 3], [[Real; 4]; 3]) {
+        let (mut corner, mut way) = ([[0.0; 4]; 3], [[0.0; 4]; 3]);
+        for x in 0..3 {
+            let (m, p, q) = (self.center[x], self.p[x], self.q[x]);
+            for e in 0..4 {
+                corner[x][e] = m + SIGNS[e].0 * p + SIGNS[e].1 * q;
+            }
+            way[x] = [-2.0 * p, -2.0 * q, 2.0 * p, 2.0 * q];
+        }
+        (corner, way)
     }
 }

@@ -1,15 +1,16 @@
 //! Distance of two convex shapes: the Gilbert–Johnson–Keerthi algorithm on support maps.
 //!
-//! Each shape is a core (a point, a segment, corners) grown by a radius. The distance of the cores is that of the origin from
-//! the set of differences `x2 − x1`, which is searched with simplices of up to four of its extreme points: the point `v` of the
-//! simplex closest to the origin gives the next direction, until no extreme point lies further towards the origin.
-//! Sources: Gilbert, Johnson, Keerthi, "A fast procedure for computing the distance between complex objects", 1988; Ericson,
-//! "Real-Time Collision Detection", 2005, chapter 5.1 (closest points of triangles and tetrahedra by regions).
+//! Each shape is a core (a point, a segment, corners) grown by a radius. The distance of the cores is that of the
+//! origin from the set of differences `x2 − x1`, which is searched with simplices of up to four of its extreme points:
+//! the point `v` of the simplex closest to the origin gives the next direction, until no extreme point lies further
+//! towards the origin. Sources: Gilbert, Johnson, Keerthi, "A fast procedure for computing the distance between
+//! complex objects", 1988; Ericson, "Real-Time Collision Detection", 2005, chapter 5.1 (closest points of triangles
+//! and tetrahedra by regions).
 //!
-//! The search runs in `f64` on the `f32` input: gaps of a millimetre beside corners a hundred kilometres away keep their sign
-//! and direction, and the result is the same on every machine, as `f64` arithmetic is IEEE's too. The witness points come from
-//! the weights of the simplex. Only the cores are compared: where they overlap, [`closest`] gives `None` and the caller turns to
-//! the separating axes.
+//! The search runs in `f64` on the `f32` input: gaps of a millimetre beside corners a hundred kilometres away keep
+//! their sign and direction, and the result is the same on every machine, as `f64` arithmetic is IEEE's too. The
+//! witness points come from the weights of the simplex. Only the cores are compared: where they overlap, [`closest`]
+//! gives `None` and the caller turns to the separating axes.
 
 use crate::math::{Pose, Real, Vec3};
 use crate::shape::{Capsule, ConvexHull, Cuboid, Shape, Sphere};
@@ -218,7 +219,8 @@ impl Simplex {
         (0..self.count).fold(DVec3::ZERO, |sum, k| sum + self.corners[k].point1 * self.weights[k])
     }
 
-    /// Keeps the corners of the face, edge or corner closest to the origin and sets their weights; false if it is inside.
+    /// Keeps the corners of the face, edge or corner closest to the origin and sets their weights; false if it is
+    /// inside.
     fn reduce(&mut self) -> bool {
         let p = self.corners.map(|c| c.difference);
         let (indices, weights, count) = match self.count {
@@ -306,4 +308,100 @@ fn nearest<const N: usize>(p: &[DVec3; 4], features: [Feature; N]) -> Feature {
 
 fn combine(p: &[DVec3; 4], (indices, weights, count): &Feature) -> DVec3 {
     (0..*count).fold(DVec3::ZERO, |sum, k| sum + p[indices[k]] * weights[k])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Rotation;
+    use crate::narrow_phase::tests::Random;
+
+    fn gap(a: &Support, b: &Support, pose: &Pose) -> Option<Closest> {
+        let found = closest(a, b, pose);
+        let swapped = closest(b, a, &pose.inverse());
+        assert_eq!(found.is_none(), swapped.is_none());
+        if let (Some(x), Some(y)) = (found, swapped) {
+            assert!((x.distance - y.distance).abs() < 1e-5 * (1.0 + x.distance));
+        }
+        found
+    }
+
+    /// Corners 100 km away, a gap of a millimetre: neither is lost.
+    #[test]
+    fn a_small_gap_beside_large_coordinates_is_exact() {
+        let far = Support::Triangle([
+            Vec3::new(1e5, 0.001, -1e5),
+            Vec3::new(-1.3e5, 0.001, -1e5),
+            Vec3::new(0.0, 0.001, 1.7e5),
+        ]);
+        let point = Support::Sphere(Sphere::new(1.0).unwrap());
+        let found = gap(&point, &far, &Pose::IDENTITY).unwrap();
+        assert!((found.distance - 0.001).abs() < 1e-9, "{found:?}");
+        assert!((found.point2 - Vec3::new(0.0, 0.001, 0.0)).length() < 1e-9, "{found:?}");
+        assert!((found.normal - Vec3::Y).length() < 1e-7);
+        let floor = Support::Cuboid(Cuboid::new(Vec3::new(4000.0, 0.5, 4000.0)).unwrap());
+        for height in [0.0005, 0.002, 0.02] {
+            for k in 0..25 {
+                let at = Vec3::new(150.0 * (k % 5) as Real, 0.5 + height, -770.0 * (k / 5) as Real);
+                let found = gap(&floor, &point, &Pose::from_position(at)).unwrap();
+                assert!((found.distance - (at.y - 0.5)).abs() < 1e-9 && (found.normal - Vec3::Y).length() < 1e-6);
+            }
+        }
+    }
+
+    /// Closest points on boxes against projecting back and forth between them, which converges slowly but surely.
+    #[test]
+    fn boxes_are_as_far_apart_as_alternating_projections_find() {
+        let mut random = Random(0x1357_9BDF_2468_ACE1);
+        let mut apart = 0;
+        for _ in 0..2000 {
+            let half = |r: &mut Random| Vec3::new(r.between(0.1, 1.0), r.between(0.1, 1.0), r.between(0.1, 1.0));
+            let (h1, h2) = (half(&mut random), half(&mut random));
+            let pose = Pose::new(random.vector() * 3.0, random.rotation());
+            let (a, b) = (Support::Cuboid(Cuboid::new(h1).unwrap()), Support::Cuboid(Cuboid::new(h2).unwrap()));
+            let m = pose.rotation.to_mat3();
+            let m = DMat3::from_cols(m.x_axis.as_dvec3(), m.y_axis.as_dvec3(), m.z_axis.as_dvec3());
+            let (t, h1, h2) = (pose.position.as_dvec3(), h1.as_dvec3(), h2.as_dvec3());
+            let mut p = DVec3::ZERO;
+            let mut q = t;
+            for _ in 0..20_000 {
+                q = t + m * (m.transpose() * (p - t)).clamp(-h2, h2);
+                let next = q.clamp(-h1, h1);
+                let done = (next - p).length() < 1e-12;
+                p = next;
+                if done {
+                    break;
+                }
+            }
+            let expected = (q - p).length();
+            match gap(&a, &b, &pose) {
+                Some(found) => {
+                    apart += 1;
+                    assert!((f64::from(found.distance) - expected).abs() < 1e-4, "{found:?} {expected}");
+                    assert!(((found.point2 - found.point1).length() - found.distance).abs() < 1e-5);
+                    assert!((found.normal.length() - 1.0).abs() < 1e-6);
+                }
+                None => assert!(expected < 1e-3, "{expected}"),
+            }
+        }
+        assert!(apart > 1000);
+    }
+
+    #[test]
+    fn known_distances() {
+        let cube = Support::Cuboid(Cuboid::new(Vec3::splat(0.5)).unwrap());
+        let ball = Support::Sphere(Sphere::new(1.0).unwrap());
+        let tilted = Pose::new(Vec3::new(0.0, 3.0, 0.0), Rotation::from_xyzw(0.1, 0.0, 0.0, 1.0).normalize());
+        let found = gap(&cube, &ball, &tilted).unwrap();
+        assert!((found.distance - ball.radius() - 1.5).abs() < 1e-6);
+        assert!((found.point1 - Vec3::new(0.0, 0.5, 0.0)).length() < 1e-6);
+        assert!(gap(&cube, &ball, &Pose::from_position(Vec3::new(0.0, 0.4, 0.0))).is_none());
+        // Crossed rods touch nowhere; coincident points and coplanar, crossing triangles overlap.
+        let rod = Support::Capsule(Capsule::new(1.0, 0.1).unwrap());
+        let crossed = Pose::new(Vec3::new(0.0, 0.0, 0.3), Rotation::from_xyzw(0.0, 0.0, 1.0, 1.0).normalize());
+        assert!((gap(&rod, &rod, &crossed).unwrap().distance - 0.3).abs() < 1e-6);
+        assert!(gap(&rod, &rod, &Pose::IDENTITY).is_none() && gap(&ball, &ball, &Pose::IDENTITY).is_none());
+        let triangle = Support::Triangle([Vec3::ZERO, Vec3::X, Vec3::Y]);
+        assert!(gap(&triangle, &triangle, &Pose::from_position(Vec3::new(0.2, 0.1, 0.0))).is_none());
+    }
 }

@@ -1,10 +1,12 @@
 //! Contacts between two shapes: which points touch, along which normal, how deep.
 //!
-//! [`collide`] sorts a pair by the kind of its shapes, so that each kernel is written once, with the more complex shape in
-//! the role of shape 1: mesh, hull, cuboid, capsule, sphere. Where the caller's order is the other one, the result is mirrored.
+//! [`collide`] sorts a pair by the kind of its shapes, so that each kernel is written once, with the more complex
+//! shape in the role of shape 1: mesh, hull, cuboid, capsule, sphere. Where the caller's order is the other one, the
+//! result is mirrored.
 //!
 //! Every kernel keeps these laws:
-//! - all is in the frame of shape 1, so only the relative pose counts and a pair far from the origin loses no precision;
+//! - all is in the frame of shape 1, so only the relative pose counts and a pair far from the origin loses no
+//! precision;
 //! - a normal is a finite unit vector from shape 1 to shape 2, even where centres coincide or edges are parallel;
 //! - all points of a convex pair have the bit-equal normal;
 //! - a manifold is complete in one call: up to four points, those within `margin` included, those beyond it left out;
@@ -15,13 +17,18 @@ mod capsule;
 mod clip;
 mod cuboid;
 mod distance;
+mod hull;
 mod manifold;
 mod mesh;
 mod mesh_points;
 mod polyhedron;
 mod sphere;
+mod time_of_impact;
 mod triangle;
 mod triangle_solid;
+
+pub(crate) use distance::Support;
+pub(crate) use time_of_impact::{Sweep, time_of_impact};
 
 pub use manifold::{Manifold, ManifoldPoint};
 
@@ -44,8 +51,8 @@ pub struct PairCache {
 
 /// Finds the contacts of two shapes that are closer than `margin` (metres, zero or more).
 ///
-/// `pose` places shape 2 in the frame of shape 1; the manifold is in that frame, its normals point from shape 1 to shape 2.
-/// Two meshes never touch.
+/// `pose` places shape 2 in the frame of shape 1; the manifold is in that frame, its normals point from shape 1 to
+/// shape 2. Two meshes never touch.
 ///
 /// ```
 /// use arbiter3d::{Shape, math::{Pose, Vec3}, narrow_phase::{Manifold, PairCache, collide}};
@@ -101,6 +108,10 @@ fn collide_sorted(
         (Shape::Cuboid(a), Shape::Sphere(b)) => sphere::cuboid_sphere(a, b, pose, margin, manifold),
         (Shape::Capsule(a), Shape::Capsule(b)) => capsule::capsule_capsule(a, b, pose, margin, manifold),
         (Shape::Cuboid(a), Shape::Capsule(b)) => capsule::cuboid_capsule(a, b, pose, margin, manifold),
+        (Shape::Hull(a), Shape::Sphere(b)) => sphere::hull_sphere(a, b, pose, margin, manifold),
+        (Shape::Hull(a), Shape::Capsule(b)) => capsule::hull_capsule(a, b, pose, margin, manifold),
+        (Shape::Hull(a), Shape::Cuboid(b)) => hull::hull_cuboid(a, b, pose, margin, (cache, manifold)),
+        (Shape::Hull(a), Shape::Hull(b)) => hull::hull_hull(a, b, pose, margin, (cache, manifold)),
         (Shape::Mesh(_), Shape::Mesh(_)) => manifold.clear(),
         (Shape::Mesh(a), convex) => mesh::collide(a, convex, pose, margin, cache, manifold),
         _ => manifold.clear(),

@@ -1,10 +1,10 @@
 //! One view of cuboids and hulls for the kernels that work on faces, edges and corners.
 //!
 //! A cuboid has the topology of a hull that never changes; only its eight corners and six offsets are filled in.
-//! Corner `i` of a cuboid has `x > 0` if bit 0 of `i` is set, `y > 0` for bit 1, `z > 0` for bit 2. Face `2k` looks down
-//! axis `k`, face `2k + 1` up.
+//! Corner `i` of a cuboid has `x > 0` if bit 0 of `i` is set, `y > 0` for bit 1, `z > 0` for bit 2. Face `2k` looks
+//! down axis `k`, face `2k + 1` up.
 
-use crate::math::{Real, Vec3, abs3};
+use crate::math::{Real, Vec3, abs3, max};
 use crate::shape::{ConvexHull, Cuboid, HalfEdge, Plane};
 
 /// Corners of each face of a cuboid, counter-clockwise from outside.
@@ -61,11 +61,25 @@ const fn find(ids: &[[u16; 4]; 6], faces: usize, a: u8, b: u8) -> u16 {
     u16::MAX
 }
 
+/// The length that tolerances of a shape are relative to: half its thickness, but for a sheet, whose thickness would
+/// put them below the rounding of its other coordinates, a fiftieth of half its length.
+#[inline(always)]
+pub(crate) fn tolerance_size(half_thickness: Real, half_length: Real) -> Real {
+    max(half_thickness, 0.02 * half_length)
+}
+
+/// [`tolerance_size`] of a cuboid.
+#[inline(always)]
+pub(crate) fn cuboid_size(half_extents: Vec3) -> Real {
+    tolerance_size(half_extents.min_element(), half_extents.max_element())
+}
+
 /// The corners and planes of a cuboid.
 pub(crate) struct CuboidFeatures {
     vertices: [Vec3; 8],
     planes: [Plane; 6],
     inner_radius: Real,
+    size: Real,
 }
 
 impl CuboidFeatures {
@@ -77,6 +91,7 @@ impl CuboidFeatures {
             vertices: std::array::from_fn(|i| Vec3::new(sign(i, 0, h.x), sign(i, 1, h.y), sign(i, 2, h.z))),
             planes: [-Vec3::X, Vec3::X, -Vec3::Y, Vec3::Y, -Vec3::Z, Vec3::Z].map(plane),
             inner_radius: h.min_element(),
+            size: cuboid_size(h),
         }
     }
 
@@ -88,6 +103,7 @@ impl CuboidFeatures {
             edges: &TOPOLOGY.0,
             center: Vec3::ZERO,
             inner_radius: self.inner_radius,
+            size: self.size,
         }
     }
 }
@@ -101,8 +117,10 @@ pub(crate) struct Polyhedron<'a> {
     pub edges: &'a [HalfEdge],
     /// A point inside.
     pub center: Vec3,
-    /// Radius of a ball about `center` that fits inside: the length that tolerances are relative to.
+    /// Radius of a ball about `center` that fits inside.
     pub inner_radius: Real,
+    /// The length that tolerances are relative to: see [`tolerance_size`].
+    pub size: Real,
 }
 
 impl<'a> Polyhedron<'a> {
@@ -114,6 +132,7 @@ impl<'a> Polyhedron<'a> {
             edges: hull.edges(),
             center: hull.mass_properties(1.0).center,
             inner_radius: hull.inner_radius(),
+            size: tolerance_size(hull.inner_radius(), hull.local_aabb().half_extents().max_element()),
         }
     }
 

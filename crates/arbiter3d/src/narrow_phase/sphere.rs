@@ -1,12 +1,15 @@
 //! Spheres against spheres, capsules, cuboids and hulls: one point, from the closest point of the other shape.
 //!
-//! With `c` the centre of the sphere and `q` the closest point of the other shape's core (a point, a segment, a solid), the
-//! normal is `(c − q) / |c − q|` and the separation `|c − q|` minus the radii. Where `c` is inside a solid, the nearest face
-//! gives normal and depth; where `c = q` any direction square to the core is as good as another.
+//! With `c` the centre of the sphere and `q` the closest point of the other shape's core (a point, a segment, a
+//! solid), the normal is `(c − q) / |c − q|` and the separation `|c − q|` minus the radii. Where `c` is inside a
+//! solid, the nearest face gives normal and depth; where `c = q` any direction square to the core is as good as
+//! another.
 
+use super::distance::{Support, closest};
+use super::polyhedron::Polyhedron;
 use super::{Manifold, ManifoldPoint};
 use crate::math::{Pose, Real, Vec3, clamp, normalize_or, tangents};
-use crate::shape::{Capsule, Cuboid, Sphere};
+use crate::shape::{Capsule, ConvexHull, Cuboid, Sphere};
 
 /// Sphere against sphere.
 pub(crate) fn sphere_sphere(a: &Sphere, b: &Sphere, pose: &Pose, margin: Real, manifold: &mut Manifold) {
@@ -45,6 +48,39 @@ pub(crate) fn cuboid_sphere(a: &Cuboid, b: &Sphere, pose: &Pose, margin: Real, m
     let mut point1 = c;
     point1[axis] = sign * h[axis];
     manifold.push(ManifoldPoint { point1, normal, separation: gaps[axis] - b.radius(), feature: 0 });
+}
+
+/// Hull (shape 1) against sphere.
+///
+/// The face that the centre is highest above holds the closest point whenever the centre is over it, and shows at once
+/// when the pair is apart; beside it, an edge or a corner is closest and [`closest`] finds it.
+pub(crate) fn hull_sphere(a: &ConvexHull, b: &Sphere, pose: &Pose, margin: Real, manifold: &mut Manifold) {
+    manifold.clear();
+    let polyhedron = Polyhedron::from_hull(a);
+    let (c, r) = (pose.position, b.radius());
+    let (mut face, mut height) = (0, -Real::MAX);
+    for (i, plane) in polyhedron.planes.iter().enumerate() {
+        let h = plane.normal.dot(c) - plane.offset;
+        if h > height {
+            (face, height) = (i, h);
+        }
+    }
+    if height > r + margin {
+        return;
+    }
+    let normal = polyhedron.planes[face].normal;
+    let over = |edge| {
+        let (out, offset) = polyhedron.side_plane(edge, normal);
+        out.dot(c) <= offset
+    };
+    if height > 0.0
+        && !polyhedron.face_loop(face).all(over)
+        && let Some(found) = closest(&Support::Hull(a), &Support::Sphere(*b), pose)
+    {
+        push_rounded(found.point1, 0.0, c, r, normal, (margin, manifold));
+        return;
+    }
+    manifold.push(ManifoldPoint { point1: c - normal * height, normal, separation: height - r, feature: 0 });
 }
 
 /// One point between two cores that are closest at `p1` and `p2`, each with a radius.

@@ -1,23 +1,25 @@
 //! Convex polyhedra: vertices, merged faces, half edges, and what collision detection wants to know about them.
 //!
-//! Built in three steps: `hull_builder` finds the exactly convex triangulated hull, `hull_merge` joins coplanar triangles
-//! and drops vertices that are no corners, and this file fits the planes and pairs the half edges.
+//! Built in three steps: `hull_builder` finds the exactly convex triangulated hull, `hull_merge` joins coplanar
+//! triangles and drops vertices that are no corners, and this file fits the planes and pairs the half edges.
 //!
-//! Planes: the normal is Newell's (the sum of the cross products of consecutive corners, twice the vector area), the offset
-//! is the largest over *all* vertices, so that nothing sticks out. Newell's normal of a sliver can tilt; the plane then falls
-//! back on the normal of the face's largest triangle, which supports the hull exactly.
+//! Planes: the normal is Newell's (the sum of the cross products of consecutive corners, twice the vector area), the
+//! offset is the largest over *all* vertices, so that nothing sticks out. Newell's normal of a sliver can tilt; the
+//! plane then falls back on the normal of the face's largest triangle, which supports the hull exactly.
 //!
-//! Mass: the divergence theorem over the triangles of the faces, as signed tetrahedra `(0, a, b, c)` about an inside point
-//! near the centre, with `d = a · (b × c)`:
+//! Mass: the divergence theorem over the triangles of the faces, as signed tetrahedra `(0, a, b, c)` about an inside
+//! point near the centre, with `d = a · (b × c)`:
 //!
-//!     ∫ 1 = d/6,   ∫ x = d/24 (a + b + c),   ∫ x xᵀ = d/120 (a aᵀ + b bᵀ + c cᵀ + s sᵀ),   s = a + b + c
+//! ```text
+//! ∫ 1 = d/6,   ∫ x = d/24 (a + b + c),   ∫ x xᵀ = d/120 (a aᵀ + b bᵀ + c cᵀ + s sᵀ),   s = a + b + c
+//! ```
 //!
 //! Source: Brian Mirtich, "Fast and Accurate Computation of Polyhedral Mass Properties", 1996, for the reduction; the
 //! moments of the unit simplex for the numbers. All of it in double precision, stored in single.
 //!
-//! Invariants: closed (`V − E + F = 2`), counter-clockwise from outside, the twin of half edge `i` is `i ^ 1`, faces have
-//! three corners or more, vertices three faces or more. Vertices keep the order of the input points; a face starts at its lowest
-//! vertex, and the faces are sorted: the same points give the same hull, bit for bit.
+//! Invariants: closed (`V − E + F = 2`), counter-clockwise from outside, the twin of half edge `i` is `i ^ 1`, faces
+//! have three corners or more, vertices three faces or more. Vertices keep the order of the input points; a face
+//! starts at its lowest vertex, and the faces are sorted: the same points give the same hull, bit for bit.
 
 use super::hull_builder::{Lattice, TriangulatedHull};
 use super::hull_merge::{Outline, simplify, triangles_as_outlines};
@@ -103,12 +105,12 @@ pub struct ConvexHull {
 impl ConvexHull {
     /// The convex hull of some points, metres.
     ///
-    /// Points closer to a face than about `3 ε (|x| + |y| + |z|)` of the largest coordinates (half a micrometre for a crate
-    /// of one metre) count as on it, and points that are no corners of the hull are left out.
+    /// Points closer to a face than about `3 ε (|x| + |y| + |z|)` of the largest coordinates (half a micrometre for a
+    /// crate of one metre) count as on it, and points that are no corners of the hull are left out.
     ///
     /// # Errors
-    /// If a point is not finite, the points are fewer than four or flat, the hull needs more than 255 vertices, or it is so
-    /// small or large that its mass is not a number in single precision.
+    /// If a point is not finite, the points are fewer than four or flat, the hull needs more than 255 vertices, or it
+    /// is so small or large that its mass is not a number in single precision.
     pub fn new(points: &[Vec3]) -> Result<Self, ShapeError> {
         Self::build(points, MAX_TRIED_VERTICES)
     }
@@ -207,8 +209,8 @@ impl ConvexHull {
         &self.edges
     }
 
-    /// The vertices of a face, counter-clockwise seen from outside, as positions in [`vertices`](Self::vertices); none if
-    /// there is no such face.
+    /// The vertices of a face, counter-clockwise seen from outside, as positions in [`vertices`](Self::vertices);
+    /// none if there is no such face.
     pub fn face_vertices(&self, face: usize) -> impl Iterator<Item = usize> + '_ {
         let first = self.face_edges.get(face).copied();
         let mut current = first;
@@ -295,8 +297,8 @@ struct Polyhedron<'a> {
 }
 
 impl Polyhedron<'_> {
-    /// Planes, half edges and mass; `None` if the loops are no closed surface or not convex within the tolerance, an error
-    /// if single precision cannot hold the mass.
+    /// Planes, half edges and mass; `None` if the loops are no closed surface or not convex within the tolerance, an
+    /// error if single precision cannot hold the mass.
     fn assemble(self) -> Option<Result<ConvexHull, ShapeError>> {
         let (edges, face_edges) = self.half_edges()?;
         let planes: Vec<Plane> = self.outlines.iter().map(|outline| self.plane(outline)).collect::<Option<_>>()?;
@@ -306,7 +308,7 @@ impl Polyhedron<'_> {
         };
         let center = unit_mass.center.as_dvec3();
         let height = |plane: &Plane| f64::from(plane.offset) - plane.normal.as_dvec3().dot(center);
-        let inner_radius = planes.iter().map(height).fold(f64::INFINITY, f64::min).max(0.0) as Real;
+        let inner_radius = lowest(planes.iter().map(height)) as Real;
         let edge_directions = self.edge_directions(&edges);
         let padded = self.vertices.len().next_multiple_of(LANES);
         let vertex = |i: usize| self.vertices.get(i).copied().unwrap_or(self.vertices[0]);
@@ -335,7 +337,10 @@ impl Polyhedron<'_> {
         // Euler's formula, and each vertex in use.
         let mut used = vec![false; self.vertices.len()];
         self.outlines.iter().flat_map(|outline| &outline.corners).for_each(|&v| used[v] = true);
-        if self.vertices.len() + self.outlines.len() != count / 2 + 2 || count % 2 != 0 || used.contains(&false) {
+        if self.vertices.len() + self.outlines.len() != count / 2 + 2
+            || !count.is_multiple_of(2)
+            || used.contains(&false)
+        {
             return None;
         }
         let mut index_of: BTreeMap<(usize, usize), u16> = BTreeMap::new();
@@ -371,8 +376,8 @@ impl Polyhedron<'_> {
         Some((edges, face_edges))
     }
 
-    /// The plane of a face: Newell's normal, or the exact supporting normal if that one tilts; `None` if neither is within
-    /// the tolerance.
+    /// The plane of a face: Newell's normal, or the exact supporting normal if that one tilts; `None` if neither is
+    /// within the tolerance.
     fn plane(&self, outline: &Outline) -> Option<Plane> {
         let corner = |k: usize| self.position(outline.corners[k % outline.corners.len()]);
         let origin = corner(0);
@@ -386,9 +391,9 @@ impl Polyhedron<'_> {
             }
             let normal = normal.as_vec3();
             let height = |v: usize| normal.as_dvec3().dot(self.position(v));
-            let offset = (0..self.vertices.len()).map(height).fold(-f64::INFINITY, f64::max);
-            let lowest = outline.corners.iter().map(|&v| height(v)).fold(f64::INFINITY, f64::min);
-            if offset - lowest <= 3.0 * self.tolerance {
+            let offset = highest((0..self.vertices.len()).map(height));
+            let lowest_corner = lowest(outline.corners.iter().map(|&v| height(v)));
+            if offset - lowest_corner <= 3.0 * self.tolerance {
                 return Some(Plane { normal, offset: offset as Real });
             }
         }
@@ -446,6 +451,16 @@ impl Polyhedron<'_> {
         }
         directions.into_iter().map(|direction| direction.as_vec3()).collect()
     }
+}
+
+/// The least value; of zeros with different signs the first, which `f64::min` leaves open.
+fn lowest(values: impl Iterator<Item = f64>) -> f64 {
+    values.fold(f64::INFINITY, |least, value| if value < least { value } else { least })
+}
+
+/// The largest value; of zeros with different signs the first.
+fn highest(values: impl Iterator<Item = f64>) -> f64 {
+    values.fold(-f64::INFINITY, |largest, value| if value > largest { value } else { largest })
 }
 
 #[cfg(test)]

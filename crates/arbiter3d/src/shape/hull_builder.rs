@@ -1,22 +1,24 @@
 //! Quickhull on a lattice: the exactly convex triangulated hull of a cloud of points.
 //!
-//! The outline is Barber, Dobkin and Huhdanpaa, "The quickhull algorithm for convex hulls", 1996, with the bookkeeping of
-//! Dirk Gregorius, "Implementing QuickHull", GDC 2014: start from a tetrahedron; every triangle keeps the list of points
-//! in front of it (its conflicts); take the point farthest in front of any triangle, remove the triangles it sees, and
-//! join the rim of the hole (the horizon) to it; hand the conflicts of the removed triangles to the new ones.
+//! The outline is Barber, Dobkin and Huhdanpaa, "The quickhull algorithm for convex hulls", 1996, with the
+//! bookkeeping of Dirk Gregorius, "Implementing QuickHull", GDC 2014: start from a tetrahedron; every triangle keeps
+//! the list of points in front of it (its conflicts); take the point farthest in front of any triangle, remove the
+//! triangles it sees, and join the rim of the hole (the horizon) to it; hand the conflicts of the removed triangles
+//! to the new ones.
 //!
-//! What usually breaks a quickhull is a rounded visibility test: the horizon stops being one simple loop. Here the test
-//! is exact. The points are first snapped to a lattice of 2^30 steps along their largest extent (about a hundred times
-//! finer than the tolerance below), so that a triangle's normal fits an `i64` and its product with a point an `i128`.
-//! A triangle is removed only if the point is strictly in front of its plane, and hence the visible triangles of a convex
-//! hull are one disk, the horizon is one simple loop, and no new triangle has zero area.
+//! What usually breaks a quickhull is a rounded visibility test: the horizon stops being one simple loop. Here the
+//! test is exact. The points are first snapped to a lattice of 2^29 or more steps along their largest extent (about a
+//! hundred times finer than the tolerance below), so that a triangle's normal fits an `i64` and its product with a
+//! point an `i128`. A triangle is removed only if the point is strictly in front of its plane, and hence the visible
+//! triangles of a convex hull are one disk, the horizon is one simple loop, and no new triangle has zero area.
 //!
-//! Tolerances decide only *which* points are worth adding: those more than `3 ε (|x|max + |y|max + |z|max)` in front of a
-//! triangle, about the rounding that the coordinates of a point on a face have seen already. As a hull vertex is never in
-//! front of a triangle, two hull vertices are always farther apart than the tolerance: near duplicates are welded.
+//! Tolerances decide only *which* points are worth adding: those more than `3 ε (|x|max + |y|max + |z|max)` in front
+//! of a triangle, about the rounding that the coordinates of a point on a face have seen already. As a hull vertex is
+//! never in front of a triangle, two hull vertices are always farther apart than the tolerance: near duplicates are
+//! welded.
 //!
-//! Invariants: the triangles are a closed surface, counter-clockwise seen from outside, every edge convex or exactly flat;
-//! every input point is within the tolerance of the inside, unless the vertex limit stopped the work early.
+//! Invariants: the triangles are a closed surface, counter-clockwise seen from outside, every edge convex or exactly
+//! flat; every input point is within the tolerance of the inside, unless the vertex limit stopped the work early.
 
 use super::ShapeError;
 use crate::math::{Real, Vec3};
@@ -60,8 +62,8 @@ impl Lattice {
         if extent <= 0.0 {
             return Err(ShapeError::Flat { count: points.len(), tolerance: tolerance_in_metres as Real });
         }
-        // The power of two that brings the extent to [2^29, 2^30): it keeps coordinates with few digits exact. The extent
-        // of `f32` coordinates is a normal `f64`, so both exponents are in range.
+        // The power of two that brings the extent to [2^29, 2^30): it keeps coordinates with few digits exact. The
+        // extent of `f32` coordinates is a normal `f64`, so both exponents are in range.
         let exponent = extent.to_bits() >> 52;
         let scale = f64::from_bits((2 * 1023 + LATTICE_BITS - exponent) << 52);
         let snap = |x: f64| ((x * scale + 0.5) as i64) as f64;
@@ -204,7 +206,8 @@ impl<'a> Quickhull<'a> {
         self.farthest().is_some()
     }
 
-    /// Gives each point to the one of these triangles that it is farthest in front of; points in front of none are inside.
+    /// Gives each point to the one of these triangles that it is farthest in front of; points in front of none are
+    /// inside.
     fn assign(&mut self, points: &[usize], faces: &[usize]) {
         for &point in points {
             let position = self.points[point];
@@ -346,11 +349,10 @@ impl<'a> Quickhull<'a> {
         let truncated = self.farthest().is_some();
         let mut number = vec![NONE; self.points.len()];
         let mut face_number = vec![NONE; self.faces.len()];
-        let mut count = 0;
-        for (index, face) in self.faces.iter().enumerate().filter(|(_, face)| face.alive) {
-            face_number[index] = count;
-            count += 1;
-            for v in face.vertices {
+        let alive = (0..self.faces.len()).filter(|&face| self.faces[face].alive);
+        for (position, index) in alive.enumerate() {
+            face_number[index] = position;
+            for v in self.faces[index].vertices {
                 number[v] = 0;
             }
         }

@@ -1,25 +1,28 @@
 //! From the triangles of a hull to its faces: coplanar triangles merge, and vertices that are no corners go.
 //!
-//! Flat regions: the largest free triangle is a seed; its face takes in neighbours whose vertices are within the tolerance
-//! of the *seed's* plane. Measuring against one plane, which supports the hull exactly, keeps a chain of slightly bent
-//! triangles from rolling up into one face. The outline of a region is the loop of edges whose twin is in another region.
+//! Flat regions: the largest free triangle is a seed; its face takes in neighbours whose vertices are within the
+//! tolerance of the *seed's* plane. Measuring against one plane, which supports the hull exactly, keeps a chain of
+//! slightly bent triangles from rolling up into one face. The outline of a region is the loop of edges whose twin is
+//! in another region.
 //!
 //! A merged outline can have vertices that are no corners. Let `a, b, c` be neighbours on it:
 //! - `b` is on the line `ac` within the tolerance (the middle of an edge), or the outline is concave there;
 //! - a vertex on no outline is inside a face.
 //!
-//! Each of these is within about the tolerance of the hull of the other vertices: the vertices of a region are in a slab
-//! of that height, and in the plane such a `b` is on a segment or inside the outline of the others. So the vertex is
-//! dropped, and the exact hull of the rest is built again, rather than repairing the surface by local surgery (which is
-//! where merging hulls usually go wrong). No two neighbours are dropped in one pass, so that a finely rounded outline
-//! loses vertices only until those left stand out by the tolerance. Every pass has fewer vertices: it ends.
+//! Each of these is within about the tolerance of the hull of the other vertices: the vertices of a region are in a
+//! slab of that height, and in the plane such a `b` is on a segment or inside the outline of the others. So the
+//! vertex is dropped, and the exact hull of the rest is built again, rather than repairing the surface by local
+//! surgery (which is where merging hulls usually go wrong). No two neighbours are dropped in one pass, so that a
+//! finely rounded outline loses vertices only until those left stand out by the tolerance. Every pass has fewer
+//! vertices: it ends.
 //!
 //! What is left: faces with strictly convex outlines, and at every vertex three faces or more.
 
 use super::hull_builder::{HullTriangle, TriangulatedHull};
 use glam::DVec3;
 
-/// Triangles turned by more than 60° from the seed are not the same face, however small they are: a region must not fold.
+/// Triangles turned by more than 60° from the seed are not the same face, however small they are: a region must not
+/// fold.
 const LEAST_COSINE: f64 = 0.5;
 
 const NONE: usize = usize::MAX;
@@ -127,8 +130,8 @@ impl<'a> Regions<'a> {
         seed.normal.dot(*normal) > LEAST_COSINE && vertices.iter().all(near)
     }
 
-    /// The loops around the regions. Regions that are no simple disk, or that leave a vertex with two faces which neither
-    /// face can do without, are taken apart into their triangles first.
+    /// The loops around the regions. Regions that are no simple disk, or that leave a vertex with two faces which
+    /// neither face can do without, are taken apart into their triangles first.
     fn outlines(mut self) -> Vec<Outline> {
         loop {
             let loops: Vec<Option<Vec<usize>>> = (0..self.members.len()).map(|region| self.outline(region)).collect();
@@ -171,8 +174,8 @@ impl<'a> Regions<'a> {
         (current == start && corners.len() == edges.len() && corners.len() >= 3).then_some(corners)
     }
 
-    /// A region to take apart because it shares a vertex with only one other one, and both need that vertex as a corner:
-    /// the tip of a needle thinner than the tolerance. Dropping the vertex would cut the needle off.
+    /// A region to take apart because it shares a vertex with only one other one, and both need that vertex as a
+    /// corner: the tip of a needle thinner than the tolerance. Dropping the vertex would cut the needle off.
     fn too_eager(&self, loops: &[Option<Vec<usize>>]) -> Option<usize> {
         let count = self.hull.points.len();
         let mut faces = vec![0; count];

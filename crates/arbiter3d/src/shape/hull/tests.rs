@@ -49,7 +49,7 @@ fn cylinder(sides: usize) -> Vec<Vec3> {
         let angle = k as f64 * std::f64::consts::TAU / sides as f64;
         (libm::cos(angle) as Real, libm::sin(angle) as Real)
     };
-    (0..2 * sides).map(|k| Vec3::new(ring(k / 2).0, if k % 2 == 0 { -0.5 } else { 0.5 }, ring(k / 2).1)).collect()
+    (0..2 * sides).map(|k| Vec3::new(ring(k / 2).0, if k & 1 == 0 { -0.5 } else { 0.5 }, ring(k / 2).1)).collect()
 }
 
 fn rotated(points: &[Vec3], rotation: Rotation, shift: Vec3) -> Vec<Vec3> {
@@ -78,6 +78,9 @@ fn check(hull: &ConvexHull, points: &[Vec3]) {
         assert_ne!(edge.face, twin.face);
     }
     let mut visits = 0;
+    for vertex in 0..vertices.len() {
+        assert!(edges.iter().filter(|edge| usize::from(edge.origin) == vertex).count() >= 3, "three faces at a corner");
+    }
     for (face, plane) in hull.planes().iter().enumerate() {
         assert!((plane.normal.length() - 1.0).abs() < 1e-6);
         let corners: Vec<usize> = hull.face_vertices(face).collect();
@@ -112,7 +115,7 @@ fn check_all_inside(hull: &ConvexHull, points: &[Vec3]) -> f64 {
         }
     }
     worst /= tolerance(points);
-    assert!(worst < 4.0, "a point sticks out by {worst} tolerances");
+    assert!(worst < 2.5, "a point sticks out by {worst} tolerances");
     worst
 }
 
@@ -131,7 +134,7 @@ fn known_solids_have_their_vertices_edges_and_faces() {
     let mut random = Random(77);
     for (points, vertices, edges, faces) in solids {
         for turn in 0..40 {
-            let shift = if turn % 2 == 0 { Vec3::ZERO } else { random.in_cube() * 10.0 };
+            let shift = if turn & 1 == 0 { Vec3::ZERO } else { random.in_cube() * 10.0 };
             let placed = if turn == 0 { points.clone() } else { rotated(&points, random.rotation(), shift) };
             let hull = ConvexHull::new(&placed).unwrap();
             assert_eq!((hull.vertices().len(), hull.edges().len() / 2, hull.planes().len()), (vertices, edges, faces));
@@ -171,24 +174,41 @@ fn random_clouds_are_inside_their_hulls() {
     }
 }
 
-/// Points near a sphere, near faces, in layers a few roundings apart: where sloppy predicates lose the horizon.
+/// One of the clouds that sloppy predicates lose the horizon on: grids and prisms with noise about the size of the
+/// rounding, needles, caps hardly bent, all squashed and turned.
+fn nearly_degenerate(random: &mut Random, round: usize) -> Vec<Vec3> {
+    let small = |exponent: Real| libm::powf(10.0, -exponent);
+    let (thin, noise) = (small(7.0 * random.unit()), small(2.0 + 7.0 * random.unit()));
+    let seed = 1000 + round as u64;
+    let base: Vec<Vec3> = match round % 5 {
+        0 => grid(2 + round / 5 % 4),
+        1 => cylinder(3 + round % 60),
+        2 => cloud(seed, 60).iter().map(|p| p.normalize_or(Vec3::X)).collect(),
+        3 => cloud(seed, 30).iter().map(|p| Vec3::new(p.x, p.y * thin * p.x, p.z * thin * p.x)).collect(),
+        _ => cloud(seed, 60).iter().map(|p| Vec3::new(p.x, p.y, (1.0 - p.x * p.x - p.y * p.y) * thin)).collect(),
+    };
+    let squash = Vec3::new(1.0, small(4.0 * random.unit() * random.unit()), small(4.0 * random.unit() * random.unit()));
+    let jittered: Vec<Vec3> = base.iter().chain(&base).map(|p| (*p + random.in_cube() * noise) * squash).collect();
+    let shift = if round.is_multiple_of(2) { Vec3::ZERO } else { random.in_cube() * 3.0 };
+    if round.is_multiple_of(3) { jittered } else { rotated(&jittered, random.rotation(), shift) }
+}
+
 #[test]
 fn nearly_degenerate_clouds_still_make_closed_surfaces() {
     let mut random = Random(99);
-    for round in 0..150 {
-        let noise = [0.0, 1e-8, 1e-7, 3e-7, 1e-6, 1e-5][round % 6];
-        let steps = 2 + round / 6 % 4;
-        let base = if round % 5 == 4 { cylinder(48) } else { grid(steps) };
-        let flattened = Vec3::new(1.0, 1.0, [1.0, 1e-3, 1e-5][round % 3]);
-        let jittered: Vec<Vec3> = base.iter().chain(&base).map(|p| *p * flattened + random.in_cube() * noise).collect();
-        let points = rotated(&jittered, random.rotation(), random.in_cube());
+    let (mut closed, mut flat) = (0, 0);
+    for round in 0..1000 {
+        let points = nearly_degenerate(&mut random, round);
         match ConvexHull::new(&points) {
             Ok(hull) => {
                 check_all_inside(&hull, &points);
+                closed += 1;
             }
-            Err(error) => assert!(matches!(error, ShapeError::TooManyFeatures { .. }), "{error}"),
+            Err(ShapeError::Flat { .. }) => flat += 1,
+            Err(error) => panic!("{error}"),
         }
     }
+    assert!(closed > 800 && flat > 10, "{closed} closed, {flat} flat: the clouds should be on both sides of the limit");
 }
 
 #[test]
@@ -245,8 +265,8 @@ fn the_same_points_give_the_same_hull() {
 
 #[test]
 fn size_does_not_change_the_topology() {
-    for seed in 0..30 {
-        let points = if seed % 3 == 0 { cylinder(5 + seed as usize) } else { cloud(seed, 20 + seed as usize) };
+    for seed in 0..30_u64 {
+        let points = if seed.is_multiple_of(3) { cylinder(5 + seed as usize) } else { cloud(seed, 20 + seed as usize) };
         let hull = ConvexHull::new(&points).unwrap();
         for scale in [1e-6, 1e-3, 1e3, 1e6] {
             let scaled: Vec<Vec3> = points.iter().map(|p| *p * scale).collect();
@@ -361,4 +381,33 @@ fn the_fallback_of_plain_triangles_is_valid() {
         assert_eq!(hull.planes().len(), 2 * hull.vertices().len() - 4);
         check_all_inside(&hull, &points);
     }
+}
+
+/// Plates and needles half a tolerance to a few tolerances thick: either flat, or a closed surface with three faces at
+/// every corner, which does not lose its tip to merging.
+#[test]
+fn hulls_as_thin_as_the_tolerance_are_valid_or_flat() {
+    let mut random = Random(4);
+    let (mut closed, mut flat) = (0, 0);
+    for round in 0..4000_u64 {
+        let thickness = 3.0 * Real::EPSILON;
+        let y = thickness * (0.5 + 8.0 * random.unit());
+        let z = if round.is_multiple_of(2) { thickness * (0.5 + 8.0 * random.unit()) } else { 1.0 };
+        let taper = |x: Real| if round.is_multiple_of(3) { 1.0 } else { (1.0 - x) * 0.5 };
+        let count = 5 + (round % 12) as usize;
+        let squash = |p: &Vec3| Vec3::new(p.x, p.y * y * taper(p.x), p.z * z * taper(p.x));
+        let points: Vec<Vec3> = cloud(round, count).iter().map(squash).collect();
+        let points = if round % 5 < 2 { points } else { rotated(&points, random.rotation(), Vec3::ZERO) };
+        match ConvexHull::new(&points) {
+            Ok(hull) => {
+                check_all_inside(&hull, &points);
+                closed += 1;
+            }
+            Err(error) => {
+                assert!(matches!(error, ShapeError::Flat { .. }), "{error}");
+                flat += 1;
+            }
+        }
+    }
+    assert!(closed > 2000 && flat > 500, "{closed} closed, {flat} flat");
 }
