@@ -24,7 +24,9 @@ pub(crate) struct BodyState {
     pub turn: Vec3,
     /// Whether a row acts on the body in this step.
     pub constrained: u32,
-    unused: [u32; 3],
+    /// Whether contacts can move the body at all: dynamic, enabled, not locked on all axes.
+    pub moves: u32,
+    unused: [u32; 2],
 }
 
 impl Default for BodyState {
@@ -35,7 +37,8 @@ impl Default for BodyState {
             translation: Vec3::ZERO,
             turn: Vec3::ZERO,
             constrained: 0,
-            unused: [0; 3],
+            moves: 0,
+            unused: [0; 2],
         }
     }
 }

@@ -89,6 +89,7 @@ impl World {
             return Err(Error::NeitherMoves { body1, body2 });
         }
         let index = self.create_arbiter(key, body1, body2);
+        self.arbiters.custom += 1;
         self.mix_body_materials(index);
         Ok(self.arbiters.at(index).id)
     }
@@ -173,7 +174,9 @@ impl World {
                 data: arbiter.data,
             });
         }
-        if pair != NONE {
+        if pair == NONE {
+            self.arbiters.custom -= 1;
+        } else {
             self.pairs[pair as usize].arbiter = NONE;
             self.pairs[pair as usize].has_manifold = false;
         }

@@ -352,7 +352,9 @@ impl<'a> BodyMut<'a> {
         state.linear_velocity = linear * free_linear;
         state.angular_velocity = angular * free_angular;
         self.world.solver_bodies.motions[index].residual = Vec3::ZERO;
-        self.body().frozen = false;
+        if std::mem::take(&mut self.body().frozen) {
+            self.world.refresh_solver_body(self.id.index);
+        }
         if changed != Vec3::ZERO {
             self.world.wake(self.id.index);
         }
@@ -651,6 +653,8 @@ impl World {
         mass.center = body.pose.transform_point(body.mass.center);
         mass.inverse_inertia =
             if dynamic { world_inverse_inertia(&mass.rotation.to_mat3(), motion) } else { SymmetricMat3::ZERO };
+        let moves = dynamic && (free_linear != Vec3::ZERO || free_angular != Vec3::ZERO);
+        self.solver_bodies.states[index as usize].moves = u32::from(moves);
     }
 
     pub(crate) fn end_arbiters_of(&mut self, index: u32, reason: EndReason) {

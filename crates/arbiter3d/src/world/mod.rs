@@ -73,6 +73,8 @@ pub struct World {
     awake: Vec<u32>,
     shapes: Vec<shapes::ShapeSlot>,
     free_shapes: Vec<u32>,
+    /// Shapes whose proxies have moved since the last narrow phase, by slot.
+    moved_shapes: Vec<bool>,
     shape_slots: IdMap<u64, u32>,
     broad_phase: BroadPhase,
     pairs: Vec<pairs::Pair>,
@@ -140,6 +142,7 @@ impl World {
             awake: Vec::new(),
             shapes: Vec::new(),
             free_shapes: Vec::new(),
+            moved_shapes: Vec::new(),
             shape_slots: IdMap::default(),
             broad_phase: BroadPhase::new(),
             pairs: Vec::new(),
@@ -361,7 +364,7 @@ impl World {
 
     /// A proxy has moved: its pairs are tested for overlap in the next narrow phase.
     fn note_moved(&mut self, slot: u32) {
-        self.shapes[slot as usize].moved = true;
+        self.moved_shapes[slot as usize] = true;
         self.scratch.note_moved(slot);
         // Pairs whose bodies all rest are not visited: they are tested here and now.
         let body = self.shapes[slot as usize].body;

@@ -149,7 +149,7 @@ impl World {
         }
         self.providers = providers;
         for shape in self.scratch.moved.drain(..) {
-            self.shapes[shape as usize].moved = false;
+            self.moved_shapes[shape as usize] = false;
         }
     }
 
@@ -271,7 +271,7 @@ impl World {
                 BodyNews::Fast(body) => self.stop_at_impact(body),
                 BodyNews::Moved { shape, tight, fat } => {
                     if self.broad_phase.update(shape, &tight, &fat) {
-                        self.shapes[shape as usize].moved = true;
+                        self.moved_shapes[shape as usize] = true;
                         self.scratch.moved.push(shape);
                     }
                 }
@@ -327,7 +327,8 @@ impl World {
             }
         }
         self.scratch.may_break = may_break;
-        for &(_, index) in self.arbiters.order() {
+        let custom = if self.arbiters.custom > 0 { self.arbiters.order() } else { &[] };
+        for &(_, index) in custom {
             let arbiter = self.arbiters.at(index);
             if arbiter.alive && arbiter.pair == NONE && arbiter.data.usage_mask & 15 == 0 {
                 empty.push(index);
