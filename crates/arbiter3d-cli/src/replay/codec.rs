@@ -1,6 +1,6 @@
 //! Poses, states and islands of consecutive frames in few bytes.
 //!
-//! Positions are rounded to multiples of a fixed step, rotations to quaternions of four 1/8192 (0.25 mrad). Each body is
+//! Positions are rounded to multiples of a fixed step, rotations to quaternions in steps of 1/4096 (0.5 mrad). Each body is
 //! predicted to go on as it did between the last two frames, `p̂ = 2 p₁ − p₀`; only bodies that the prediction misses are
 //! written, and of those only the error. A body at rest or in straight flight therefore costs nothing, and a falling
 //! one costs the same small number every frame, which DEFLATE then folds away. Components are written one after
@@ -18,7 +18,7 @@ use flate2::{Compression, write::ZlibEncoder};
 use std::io::{self, Write as _};
 
 /// Units of a quaternion component.
-const ROTATION_SCALE: f32 = 8192.0;
+const ROTATION_SCALE: f32 = 4096.0;
 
 /// Numbers of a pose: three of the position, four of the rotation.
 const COMPONENTS: usize = 7;
@@ -296,7 +296,7 @@ pub(super) mod tests {
         assert!((f64::from(pose[0]) / STEPS_A_METRE - 1.000_1).abs() <= 0.5 / STEPS_A_METRE + 1e-7);
         assert!((f64::from(pose[1]) / STEPS_A_METRE + 0.3).abs() <= 0.5 / STEPS_A_METRE + 1e-7);
         assert_eq!(pose[2], i32::MAX);
-        assert_eq!(pose[3..], [0, 4915, 0, 6554]);
+        assert_eq!(pose[3..], [0, 2458, 0, 3277]);
     }
 
     /// The quaternion of a body that turns on and on passes through −q; the coded one never jumps.

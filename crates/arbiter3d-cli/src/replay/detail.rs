@@ -169,7 +169,8 @@ mod tests {
 
     #[test]
     fn samples_stay_even_under_the_limit() {
-        let contacts: Vec<_> = (0..400_u16).map(|i| contact(f32::from(i % 97 * (i % 89)), f32::from(i) * 1.7)).collect();
+        let contacts: Vec<_> =
+            (0..400_u16).map(|i| contact(f32::from(i % 97 * (i % 89)), f32::from(i) * 1.7)).collect();
         let arbiters: Vec<_> = (0..100).map(|i| arbiter((i, i * i), 4)).collect();
         let detail = ContactDetail { arbiters: &arbiters, contacts: &contacts };
         let mut sampler = DetailSampler::new();
