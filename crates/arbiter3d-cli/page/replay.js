@@ -297,7 +297,7 @@ function writeRotation(q, at, m, to, stride) {
  * A material with what tells bodies apart at little cost: lines along the edges of flat geometry, wedges on round
  * geometry so that rolling shows, and a grid of whole lengths on whatever stands still.
  */
-function makeMaterial({ round = false, gridSize = 0, glass = false, shell = false }) {
+function makeMaterial({ round = false, gridSize = 0, glass = false, shell = false, edgeStrength = 0.5 }) {
   const material = new THREE.MeshLambertMaterial(
     glass ? { transparent: true, opacity: 0.14, depthWrite: false, side: THREE.DoubleSide } : {},
   );
@@ -316,7 +316,7 @@ function makeMaterial({ round = false, gridSize = 0, glass = false, shell = fals
         `vec3 edgeWidth = max(fwidth(vEdge), vec3(1e-6));
          vec3 edgeLine = (1.0 - smoothstep(0.4, 1.4, vEdge / edgeWidth)) * smoothstep(6.0, 24.0, 1.0 / edgeWidth);
          float onEdge = max(edgeLine.x, max(edgeLine.y, edgeLine.z));
-         diffuseColor.rgb *= 1.0 - ${glass ? '-1.5' : '0.5'} * onEdge;
+         diffuseColor.rgb *= 1.0 - ${(glass ? -1.5 : edgeStrength).toFixed(2)} * onEdge;
          ${glass ? 'diffuseColor.a = mix(diffuseColor.a, 0.7, onEdge);' : ''}`,
       ];
   if (gridSize > 0) {
@@ -330,10 +330,10 @@ function makeMaterial({ round = false, gridSize = 0, glass = false, shell = fals
         return max(line.x, line.y) * (1.0 - smoothstep(0.05, 0.4, max(width.x, width.y)));
       }`;
     fragmentParts[1] += ` if (vGrid.w > 0.7) {
-        diffuseColor.rgb += 0.030 * gridLine(vGrid.xz) + 0.045 * gridLine(0.1 * vGrid.xz);
+        diffuseColor.rgb += 0.012 * gridLine(vGrid.xz) + 0.025 * gridLine(0.1 * vGrid.xz);
       }`;
   }
-  material.customProgramCacheKey = () => JSON.stringify([round, gridSize, glass]);
+  material.customProgramCacheKey = () => JSON.stringify([round, gridSize, glass, edgeStrength]);
   material.onBeforeCompile = (shader) => {
     shader.vertexShader = shader.vertexShader
       .replace('#include <common>', `#include <common>\n${vertexParts[0]}`)
@@ -392,16 +392,19 @@ class Batch {
 /** Dots at contacts and lines along their normals. */
 class ContactOverlay {
   constructor(scene) {
-    const dots = new THREE.PointsMaterial({ size: 6, sizeAttenuation: false, vertexColors: true, depthTest: false });
+    const dots = new THREE.PointsMaterial({ vertexColors: true, depthTest: false, transparent: true });
     dots.onBeforeCompile = (shader) => {
+      shader.vertexShader = shader.vertexShader.replace(
+        '#include <fog_vertex>',
+        '#include <fog_vertex>\ngl_PointSize = clamp(gl_PointSize, 1.5, 8.0);',
+      );
       shader.fragmentShader = shader.fragmentShader.replace(
         '#include <color_fragment>',
         '#include <color_fragment>\nif (length(gl_PointCoord - 0.5) > 0.5) discard;',
       );
     };
-    dots.transparent = true;
     this.dots = new THREE.Points(new THREE.BufferGeometry(), dots);
-    const lines = new THREE.LineBasicMaterial({ vertexColors: true, depthTest: false, transparent: true, opacity: 0.8 });
+    const lines = new THREE.LineBasicMaterial({ vertexColors: true, depthTest: false, transparent: true, opacity: 0.55 });
     this.lines = new THREE.LineSegments(new THREE.BufferGeometry(), lines);
     for (const part of [this.dots, this.lines]) {
       part.frustumCulled = false;
@@ -410,7 +413,7 @@ class ContactOverlay {
     }
   }
 
-  /** Shows the contacts listed; `length` is that of the normals. */
+  /** Shows the contacts listed; `length` is that of the normals. Weak contacts are pale blue, strong ones red. */
   show(detail, chosen, length) {
     const points = new Float32Array(3 * chosen.length);
     const ends = new Float32Array(6 * chosen.length);
@@ -420,7 +423,7 @@ class ContactOverlay {
     for (const contact of chosen) strongest = Math.max(strongest, detail.impulses[contact]);
     chosen.forEach((contact, i) => {
       const strength = strongest > 0 ? Math.sqrt(Math.max(detail.impulses[contact], 0) / strongest) : 0;
-      const colour = [0.5 + 0.5 * strength, 0.75 - 0.6 * strength, 0.8 - 0.75 * strength];
+      const colour = CONTACT_COLOURS[Math.round(16 * strength)];
       for (let axis = 0; axis < 3; axis++) {
         const start = detail.points[3 * contact + axis];
         points[3 * i + axis] = ends[6 * i + axis] = start;
@@ -428,6 +431,7 @@ class ContactOverlay {
         colours[3 * i + axis] = lineColours[6 * i + axis] = lineColours[6 * i + 3 + axis] = colour[axis];
       }
     });
+    this.dots.material.size = 0.28 * length;
     this.fill(this.dots, points, colours);
     this.fill(this.lines, ends, lineColours);
   }
@@ -452,21 +456,29 @@ const ISLAND_COLOURS = Array.from({ length: 64 }, (_, i) =>
   hsl((0.58 + i * 0.61803398875) % 1, 0.42 + 0.12 * (i % 3), 0.5 + 0.06 * (i % 2)),
 );
 const NO_ISLAND_COLOUR = hsl(0.58, 0.12, 0.58);
-const FIXED_COLOUR = hsl(0.59, 0.08, 0.3);
-const KINEMATIC_COLOUR = hsl(0.59, 0.22, 0.42);
+const FIXED_COLOUR = hsl(0.6, 0.1, 0.2);
+const KINEMATIC_COLOUR = hsl(0.59, 0.25, 0.36);
 const GLASS_COLOUR = hsl(0.57, 0.3, 0.7);
 const SELECTED_COLOUR = [1.0, 0.72, 0.12];
+const CONTACT_COLOURS = gradient(['#bfe3f2', '#7cc4e8', '#f2c14e', '#f2762e', '#e5383b'], 16);
 const SPEED_STOPS = ['#3b4cc0', '#3fa7d6', '#59cd90', '#f2c14e', '#ee6352'];
-const SPEED_COLOURS = Array.from({ length: 65 }, (_, i) => {
-  const at = (i / 64) * (SPEED_STOPS.length - 1);
-  const from = Math.min(Math.floor(at), SPEED_STOPS.length - 2);
-  const colour = new THREE.Color(SPEED_STOPS[from]).lerp(new THREE.Color(SPEED_STOPS[from + 1]), at - from);
-  return [colour.r, colour.g, colour.b];
-});
+const SPEED_COLOURS = gradient(SPEED_STOPS, 64);
+
+/** `count + 1` colours from the first stop to the last. */
+function gradient(stops, count) {
+  return Array.from({ length: count + 1 }, (_, i) => {
+    const at = (i / count) * (stops.length - 1);
+    const from = Math.min(Math.floor(at), stops.length - 2);
+    const colour = new THREE.Color(stops[from]).lerp(new THREE.Color(stops[from + 1]), at - from);
+    return [colour.r, colour.g, colour.b];
+  });
+}
 
 /** A fixed fraction in [0, 1) for each body: neighbours of one island differ a little in brightness. */
 function scatter(index) {
-  return ((Math.imul(index + 1, 2654435761) >>> 8) & 0xffff) / 0x10000;
+  let bits = Math.imul(index + 1, 0x9e3779b1);
+  bits = Math.imul(bits ^ (bits >>> 15), 0x2c1b3c6d);
+  return ((bits ^ (bits >>> 13)) & 0xffff) / 0x10000;
 }
 
 class Stage {
@@ -478,7 +490,7 @@ class Stage {
     this.renderer.shadowMap.type = THREE.PCFShadowMap;
     this.renderer.shadowMap.autoUpdate = false;
     this.world = new THREE.Scene();
-    this.world.background = new THREE.Color('#1a1e23');
+    this.world.background = new THREE.Color('#15181c');
     this.camera = new THREE.PerspectiveCamera(45, 1, 0.1, 1000);
     this.controls = new THREE.OrbitControls(this.camera, canvas);
     this.controls.enableDamping = true;
@@ -516,7 +528,13 @@ class Stage {
       const [name, bodyClass] = key.split(' ');
       const kind = this.data.geometries[Number(name)]?.kind;
       const gridSize = bodyClass === 'fixed' ? 10 ** Math.round(Math.log10(2.5 * this.typicalRadius)) : 0;
-      const look = { round: name === 'ball' || name === 'tube', gridSize, glass: bodyClass === 'glass', shell: kind === 'mesh' };
+      const look = {
+        round: name === 'ball' || name === 'tube',
+        gridSize,
+        glass: bodyClass === 'glass',
+        shell: kind === 'mesh',
+        edgeStrength: bodyClass === 'moving' ? 0.5 : 0.22,
+      };
       const batch = new Batch(meshOf(name, this.data.geometries), makeMaterial(look), list, bodyClass);
       batch.solidMaterial = look.glass ? makeMaterial({ ...look, glass: false }) : batch.mesh.material;
       batch.glassMaterial = batch.mesh.material;
@@ -593,8 +611,8 @@ class Stage {
 
   light() {
     const { centre, radius } = this.focus;
-    this.world.add(new THREE.HemisphereLight('#dfe9f5', '#4a4540', 1.5));
-    const sun = new THREE.DirectionalLight('#fff4e2', 2.1);
+    this.world.add(new THREE.HemisphereLight('#dfe9f5', '#3a3836', 1.3));
+    const sun = new THREE.DirectionalLight('#fff4e2', 2.3);
     const reach = 1.8 * radius;
     sun.position.copy(centre).add(new THREE.Vector3(0.55, 1.25, 0.4).multiplyScalar(2 * reach));
     sun.target.position.copy(centre);
@@ -612,17 +630,43 @@ class Stage {
     this.world.fog = new THREE.Fog(this.world.background, 10 * radius, 40 * radius);
   }
 
-  /** Looks at a ball, from a little above. */
-  frameView({ centre, radius } = this.bounds()) {
-    const aspect = Math.min(this.camera.aspect, 1.2);
-    const distance = (0.92 * radius) / Math.sin((this.camera.fov * Math.PI) / 360) / Math.min(aspect, 1);
-    this.controls.target.copy(centre);
-    this.camera.position.copy(centre).addScaledVector(new THREE.Vector3(0.62, 0.42, 0.9).normalize(), distance);
+  /** Looks at the moving bodies, or at a ball, from a little above and as near as all of it fits. */
+  frameView(ball = null) {
+    const focus = ball ?? this.bounds();
+    const toCamera = new THREE.Vector3(0.62, 0.5, 0.9).normalize();
+    this.controls.target.copy(focus.centre);
+    this.camera.position.copy(focus.centre).add(toCamera);
+    this.camera.lookAt(focus.centre);
+    const distance = ball ? focus.radius / this.slopes()[1] : this.fittingDistance(focus.centre, toCamera);
+    this.camera.position.copy(focus.centre).addScaledVector(toCamera, distance);
     this.camera.near = Math.min(distance, this.focus.radius) * 0.01;
     this.camera.far = Math.max(distance, this.focus.radius) * 60;
     this.camera.updateProjectionMatrix();
     this.controls.update();
     this.dirty = true;
+  }
+
+  /** Half the width and half the height of what is seen at distance 1. */
+  slopes() {
+    const slope = Math.tan((this.camera.fov * Math.PI) / 360);
+    return [slope * this.camera.aspect, slope];
+  }
+
+  /** From where all moving bodies but one in a hundred are inside the window's middle. */
+  fittingDistance(centre, toCamera) {
+    const right = new THREE.Vector3().setFromMatrixColumn(this.camera.matrix, 0);
+    const up = new THREE.Vector3().setFromMatrixColumn(this.camera.matrix, 1);
+    const [wide, high] = this.slopes();
+    const offset = new THREE.Vector3();
+    const needed = this.movingBodies().filter((body) => this.isPresent(body)).map((body) => {
+      const radius = this.bodyRadius[body];
+      offset.set(...[3, 7, 11].map((at) => this.matrices[12 * body + at])).sub(centre);
+      const aside = (Math.abs(offset.dot(right)) + radius) / wide;
+      const above = (Math.abs(offset.dot(up)) + radius) / high;
+      return offset.dot(toCamera) + 1.25 * Math.max(aside, above);
+    });
+    needed.sort((a, b) => a - b);
+    return needed[Math.floor(0.99 * (needed.length - 1))] ?? 3 * this.focus.radius;
   }
 
   resize() {
@@ -671,11 +715,13 @@ class Stage {
   /** Colours of all bodies; `speeds` is null to colour by island. */
   paint(frame, speeds, selected) {
     for (let body = 0; body < this.bodyCount; body++) {
-      const dim = frame.states[body] === AWAKE ? 1 : 0.38;
       const colour = body === selected ? SELECTED_COLOUR : this.colourOf(body, frame, speeds);
-      const moves = this.data.bodies[body].kind === 'dynamic' && body !== selected;
-      const shade = moves ? dim * (0.86 + 0.28 * scatter(body)) : 1;
-      for (let c = 0; c < 3; c++) this.colours[3 * body + c] = shade * colour[c];
+      const varies = this.data.bodies[body].kind === 'dynamic' && body !== selected;
+      const asleep = varies && frame.states[body] !== AWAKE;
+      const shade = (varies ? 0.86 + 0.28 * scatter(body) : 1) * (asleep ? 0.4 : 1);
+      const grey = (colour[0] + colour[1] + colour[2]) / 3;
+      const fade = asleep ? 0.45 : 0;
+      for (let c = 0; c < 3; c++) this.colours[3 * body + c] = shade * (colour[c] + fade * (grey - colour[c]));
     }
     for (const batch of this.batches) batch.paint(this.colours);
     this.dirty = true;
@@ -1022,7 +1068,7 @@ class Player {
     if (this.selected < 0) return this.stage.frameView();
     const at = 12 * this.selected;
     const centre = new THREE.Vector3(...[3, 7, 11].map((offset) => this.stage.matrices[at + offset]));
-    return this.stage.frameView({ centre, radius: 4 * this.stage.bodyRadius[this.selected] });
+    return this.stage.frameView({ centre, radius: 5 * this.stage.bodyRadius[this.selected] });
   }
 
   onKey(event) {

@@ -27,7 +27,7 @@ try {
 }
 if (!existsSync(EXECUTABLE)) missing(EXECUTABLE);
 
-const SIZE = { width: 1280, height: 800 };
+const SIZE = { width: 1120, height: 700 };
 
 async function open(browser, file, hash = '') {
   const page = await browser.newPage({ viewport: SIZE });
@@ -109,9 +109,17 @@ const LAWS = {
   async 'every pose is the recorded one within the rounding'({ page, expected }) {
     const step = await page.evaluate(() => replay.data.position_step);
     assert.ok(step < 1e-3);
-    for (const { frame, body, position, rotation, state } of expected.poses) {
-      await page.evaluate(async (index) => { await replay.seek(index); replay.refresh(performance.now()); }, frame);
-      const shown = await page.evaluate((index) => replay.bodyAt(index), body);
+    const shownPoses = await page.evaluate(async (poses) => {
+      const shown = [];
+      for (const { frame, body } of poses) {
+        await replay.seek(frame);
+        replay.refresh(performance.now());
+        shown.push(replay.bodyAt(body));
+      }
+      return shown;
+    }, expected.poses);
+    for (const [i, { frame, body, position, rotation, state }] of expected.poses.entries()) {
+      const shown = shownPoses[i];
       assert.equal(shown.state, state, `state of body ${body} in frame ${frame}`);
       if (state === 0) continue;
       for (let axis = 0; axis < 3; axis++) {
