@@ -406,8 +406,11 @@ async function main() {
   window.replay = player;
 }
 
-main().catch((error) => {
+function report(error) {
   byId('message').hidden = false;
   byId('message').textContent = `The replay cannot be shown: ${error.message}`;
-  throw error;
-});
+}
+
+// A block that cannot be read may turn up only when the slider gets there.
+window.addEventListener('unhandledrejection', (event) => report(event.reason));
+main();

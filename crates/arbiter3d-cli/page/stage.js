@@ -266,9 +266,9 @@ function hsl(hue, saturation, lightness) {
 
 /** Neighbouring numbers get hues far apart: steps of the golden angle. */
 const ISLAND_COLOURS = Array.from({ length: 64 }, (_, i) =>
-  hsl((0.58 + i * 0.61803398875) % 1, 0.42 + 0.12 * (i % 3), 0.5 + 0.06 * (i % 2)),
+  hsl((0.58 + i * 0.61803398875) % 1, 0.42 + 0.12 * (i % 3), 0.47 + 0.06 * (i % 2)),
 );
-const NO_ISLAND_COLOUR = hsl(0.58, 0.12, 0.58);
+const NO_ISLAND_COLOUR = hsl(0.58, 0.4, 0.52);
 const FIXED_COLOUR = hsl(0.6, 0.1, 0.15);
 const KINEMATIC_COLOUR = hsl(0.59, 0.25, 0.36);
 const GLASS_COLOUR = hsl(0.57, 0.3, 0.7);
@@ -476,7 +476,7 @@ class Stage {
       offset.set(...[3, 7, 11].map((at) => this.matrices[12 * body + at])).sub(centre);
       const aside = (Math.abs(offset.dot(right)) + radius) / wide;
       const above = (Math.abs(offset.dot(up)) + radius) / high;
-      return offset.dot(toCamera) + 1.25 * Math.max(aside, above);
+      return offset.dot(toCamera) + 1.35 * Math.max(aside, above);
     });
     needed.sort((a, b) => a - b);
     return needed[Math.floor(0.99 * (needed.length - 1))] ?? 3 * this.focus.radius;

@@ -254,6 +254,15 @@ async function check(browser, file, expected) {
   assert.deepEqual(complaints, [], 'the console stays empty');
 }
 
+/** A page that cannot work says why, in words. */
+async function checkBroken(browser, file) {
+  const broken = readFileSync(file, 'utf8').replace(/(class="scene">.{40})/, '$1AAAA');
+  const page = await browser.newPage({ viewport: SIZE });
+  await page.setContent(broken);
+  await page.waitForFunction(() => document.getElementById('message').textContent.startsWith('The replay cannot be shown'));
+  console.log('ok - a damaged page says that it cannot be shown');
+}
+
 async function measure(browser, file) {
   const start = performance.now();
   const { page, complaints } = await open(browser, file, '#frame=120');
@@ -263,6 +272,15 @@ async function measure(browser, file) {
   const shadows = await page.evaluate(() => replay.measure(10));
   await page.locator('#show-shadows').uncheck();
   const plain = await page.evaluate(() => replay.measure(10));
+  await page.keyboard.press('Home');
+  await page.keyboard.press('Space');
+  await page.waitForTimeout(4000);
+  const film = await page.evaluate(async () => {
+    const [start, first] = [performance.now(), replay.stage.renderer.info.render.frame];
+    await new Promise((done) => setTimeout(done, 3000));
+    return (1000 * (replay.stage.renderer.info.render.frame - first)) / (performance.now() - start);
+  });
+  await page.keyboard.press('Space');
   const jump = await page.evaluate(async () => {
     const start = performance.now();
     await replay.seek(replay.frameCount - 1);
@@ -274,6 +292,7 @@ async function measure(browser, file) {
   await picture(page, 'large-contacts');
   const round = (times) => `placing ${times.script.toFixed(1)} ms, drawing ${times.draw.toFixed(1)} ms`;
   console.log(`loaded in ${loaded} ms; with shadows: ${round(shadows)}; without: ${round(plain)}`);
+  console.log(`playing: ${film.toFixed(1)} pictures a second`);
   console.log(`jump to an unread chunk: ${jump.toFixed(0)} ms`);
   assert.deepEqual(complaints, []);
 }
@@ -282,7 +301,10 @@ const browser = await chromium.launch({ executablePath: EXECUTABLE, args: FLAGS 
 try {
   const [first, second] = process.argv.slice(2);
   if (first === '--measure') await measure(browser, second);
-  else await check(browser, first, JSON.parse(readFileSync(second, 'utf8')));
+  else {
+    await check(browser, first, JSON.parse(readFileSync(second, 'utf8')));
+    await checkBroken(browser, first);
+  }
 } finally {
   await browser.close();
 }
