@@ -21,7 +21,7 @@ class Player {
     this.playing = false;
     this.bySpeed = false;
     this.selected = -1;
-    this.pace = { seconds: 0, ticks: 0, sharpness: 1 };
+    this.pace = { seconds: 0, ticks: 0, mayDropShadows: true, sharpness: 1 };
     this.shown = {};
   }
 
@@ -100,15 +100,19 @@ class Player {
     if (time >= end) this.setPlaying(false);
   }
 
-  /** Where drawing takes too long for a film, it gets coarser while playing; if that is not enough, shadows go. */
+  /** Where drawing is too slow for a film, shadows go first, once; then pixels get coarser while playing. */
   keepPace(seconds) {
     const pace = this.pace;
     pace.seconds += 0.2 * (seconds - pace.seconds);
     pace.ticks++;
-    if (pace.seconds < 0.07 || pace.ticks < 10) return;
+    if (pace.seconds < 0.07 || pace.ticks < 5) return;
     pace.ticks = 0;
-    if (pace.sharpness === 1) this.stage.setSharpness((pace.sharpness = 0.5));
-    else if (byId('show-shadows').checked) byId('show-shadows').click();
+    if (pace.mayDropShadows) {
+      pace.mayDropShadows = false;
+      if (byId('show-shadows').checked) byId('show-shadows').click();
+    } else {
+      this.stage.setSharpness((pace.sharpness = 0.5));
+    }
   }
 
   tick(now) {
@@ -201,6 +205,8 @@ class Player {
       this.showContacts(detail, everything);
       this.shown.overlay = overlay;
     }
+    const old = detail && this.data.detail_frames[sample] !== this.frame;
+    byId('contacts-age').textContent = old ? `of step ${this.data.frames.steps[this.data.detail_frames[sample]]}` : '';
     const panel = `${this.selected} ${this.frame} ${detail ? sample : -1}`;
     const soon = this.playing && now - (this.shown.panelTime ?? 0) < 100 && this.shown.panelBody === this.selected;
     if (this.shown.panel === panel || soon) return;
@@ -257,7 +263,8 @@ class Player {
     const state = ['not in the world', 'asleep', 'awake'][frame.states[body]];
     const p = [0, 1, 2].map((axis) => (frame.poses[COMPONENTS * body + axis] * this.data.position_step).toFixed(3));
     const island = frame.islands[body] < 0 ? '' : `, island ${frame.islands[body]}`;
-    const lines = [`${name ? `body ${body}, ` : ''}${kind}, ${state}${island}`, `position ${p.join(', ')} m`];
+    const doing = kind === 'static' && frame.states[body] !== ABSENT ? '' : `, ${state}`;
+    const lines = [`${name ? `body ${body}, ` : ''}${kind}${doing}${island}`, `position ${p.join(', ')} m`];
     if (kind !== 'static') lines.push(`speed ${this.speedsAt(this.frame)[body].toFixed(3)} m/s`);
     return lines.join('\n');
   }
@@ -317,7 +324,7 @@ class Player {
     if (this.selected < 0) return this.stage.frameView();
     const at = 12 * this.selected;
     const centre = new THREE.Vector3(...[3, 7, 11].map((offset) => this.stage.matrices[at + offset]));
-    return this.stage.frameView({ centre, radius: 5 * this.stage.bodyRadius[this.selected] });
+    return this.stage.frameView({ centre, radius: 7 * this.stage.bodyRadius[this.selected] });
   }
 
   onKey(event) {

@@ -273,6 +273,7 @@ const FIXED_COLOUR = hsl(0.6, 0.1, 0.15);
 const KINEMATIC_COLOUR = hsl(0.59, 0.25, 0.36);
 const GLASS_COLOUR = hsl(0.57, 0.3, 0.7);
 const SELECTED_COLOUR = [1.0, 0.72, 0.12];
+const SELECTED_FIXED_COLOUR = [0.16, 0.12, 0.04];
 const CONTACT_COLOURS = gradient(['#bfe3f2', '#7cc4e8', '#f2c14e', '#f2762e', '#e5383b'], 16);
 const SPEED_STOPS = ['#3b4cc0', '#3fa7d6', '#59cd90', '#f2c14e', '#ee6352'];
 const SPEED_COLOURS = gradient(SPEED_STOPS, 64);
@@ -528,8 +529,10 @@ class Stage {
   /** Colours of all bodies; `speeds` is null to colour by island. */
   paint(frame, speeds, selected) {
     for (let body = 0; body < this.bodyCount; body++) {
-      const colour = body === selected ? SELECTED_COLOUR : this.colourOf(body, frame, speeds);
-      const varies = this.data.bodies[body].kind === 'dynamic' && body !== selected;
+      const dynamic = this.data.bodies[body].kind === 'dynamic';
+      const highlight = dynamic ? SELECTED_COLOUR : SELECTED_FIXED_COLOUR;
+      const colour = body === selected ? highlight : this.colourOf(body, frame, speeds);
+      const varies = dynamic && body !== selected;
       const asleep = varies && frame.states[body] !== AWAKE;
       const shade = (varies ? 0.86 + 0.28 * scatter(body) : 1) * (asleep ? 0.4 : 1);
       const grey = (colour[0] + colour[1] + colour[2]) / 3;
