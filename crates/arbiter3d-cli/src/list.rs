@@ -1,7 +1,7 @@
 //! `arbiter3d list`: the built-in scenes.
 
 use crate::problem::Problem;
-use arbiter3d_scenes::SCENES;
+use arbiter3d_scenes::{SCENES, Size};
 use std::io::Write;
 
 pub(crate) fn list() -> Result<(), Problem> {
@@ -10,11 +10,11 @@ pub(crate) fn list() -> Result<(), Problem> {
 
 fn lines() -> Vec<String> {
     let width = SCENES.iter().map(|scene| scene.name.len()).max().unwrap_or(0);
-    let size = |meaning: &str| if meaning.is_empty() { String::new() } else { format!("  [--size: {meaning}]") };
-    SCENES
-        .iter()
-        .map(|scene| format!("{:width$}  {}{}", scene.name, scene.description, size(scene.size_meaning)))
-        .collect()
+    let size = |size: Size| match size.meaning {
+        "" => String::new(),
+        meaning => format!("  [--size: {meaning}, {}]", size.default),
+    };
+    SCENES.iter().map(|scene| format!("{:width$}  {}{}", scene.name, scene.description, size(scene.size))).collect()
 }
 
 /// Prints to standard output; a reader that has gone (`| head`) is no error.

@@ -187,6 +187,7 @@ fn wrong_scenes_and_options_are_one_line() {
         (vec!["run", "bounce", "--html", "a.html", "--no-html"], "--no-html"),
         (vec!["run", "bounce", "--json", "no/such/folder/a.json"], "no/such/folder/a.json"),
         (vec!["run", "bounce", "--html", "no/such/folder/a.html"], "no/such/folder/a.html"),
+        (vec!["run", "large_pyramid", "--size", "999999"], "size is 999999: it must be from 1 to 1000"),
         (vec!["bench", "nothing_of_the_kind"], "nothing_of_the_kind"),
         (vec!["frobnicate"], "frobnicate"),
     ] {

@@ -23,7 +23,7 @@ pub struct SceneOptions {
     pub substeps: Option<u32>,
     /// Steps a second; `None` takes the scene's own. Default `None`.
     pub hz: Option<Real>,
-    /// The number that scales the scene (rows of a pyramid, layers of a pile: see [`crate::Scene::size_meaning`]);
+    /// The number that scales the scene (rows of a pyramid, layers of a pile: see [`crate::Scene::size`]);
     /// `None` takes the scene's own. Default `None`.
     pub size: Option<usize>,
 }
@@ -41,29 +41,28 @@ pub(crate) const BOX3D_FRICTION: Real = 0.6;
 pub(crate) struct Builder {
     pub world: World,
     pub hz: Real,
-    /// The scale asked for, or the scene's own.
+    /// The scale.
     pub size: usize,
     seed: u64,
 }
 
 impl Builder {
     /// An empty world with the engine's settings.
-    pub fn new(options: &SceneOptions, default_size: usize) -> Result<Self, Error> {
-        Self::with_settings(options, default_size, WorldSettings::default())
+    pub fn new(options: &SceneOptions, size: usize) -> Result<Self, Error> {
+        Self::with_settings(options, size, WorldSettings::default())
     }
 
     /// An empty world with settings of the scene's own, on which the options have the last word.
-    pub fn with_settings(options: &SceneOptions, default_size: usize, settings: WorldSettings) -> Result<Self, Error> {
+    pub fn with_settings(options: &SceneOptions, size: usize, settings: WorldSettings) -> Result<Self, Error> {
         let hz = options.hz.unwrap_or(60.0);
         let substeps = options.substeps.unwrap_or(settings.substeps);
         let settings = WorldSettings { threads: options.threads, simd: options.simd, substeps, ..settings };
-        let size = options.size.unwrap_or(default_size).max(1);
         Ok(Self { world: World::new(settings)?, hz, size, seed: options.seed })
     }
 
     /// An empty world whose bodies never sleep.
-    pub fn sleepless(options: &SceneOptions, default_size: usize) -> Result<Self, Error> {
-        Self::with_settings(options, default_size, WorldSettings { allow_sleep: false, ..WorldSettings::default() })
+    pub fn sleepless(options: &SceneOptions, size: usize) -> Result<Self, Error> {
+        Self::with_settings(options, size, WorldSettings { allow_sleep: false, ..WorldSettings::default() })
     }
 
     /// The scene's random numbers: the published stream unless a seed was given.

@@ -27,7 +27,7 @@ pub mod turns;
 
 pub use builder::SceneOptions;
 pub use random::Random;
-pub use registry::{SCENES, Scene, find, nearest};
+pub use registry::{SCENES, Scene, Size, find, nearest};
 
 use arbiter3d::{Error, Real, StepReport, World};
 

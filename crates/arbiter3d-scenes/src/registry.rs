@@ -1,7 +1,7 @@
 //! The list of all scenes by name.
 
 use crate::{BuiltScene, SceneOptions, scenes};
-use arbiter3d::Error;
+use arbiter3d::{Error, Real};
 
 /// A scene that can be built by name.
 ///
@@ -16,9 +16,34 @@ pub struct Scene {
     pub name: &'static str,
     /// What it shows, in one line.
     pub description: &'static str,
-    /// What [`SceneOptions::size`] counts in this scene, with its default; empty where the scene has one size.
-    pub size_meaning: &'static str,
-    build: fn(&SceneOptions) -> Result<BuiltScene, Error>,
+    /// What [`SceneOptions::size`] counts in this scene.
+    pub size: Size,
+    build: fn(&SceneOptions, usize) -> Result<BuiltScene, Error>,
+}
+
+/// What scales a scene.
+///
+/// ```
+/// let scene = arbiter3d_scenes::find("large_pyramid").unwrap();
+/// assert_eq!((scene.size.meaning, scene.size.default), ("rows", 100));
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Size {
+    /// What it counts; empty for a scene of one size.
+    pub meaning: &'static str,
+    /// The published one.
+    pub default: usize,
+    /// The largest, some millions of bodies.
+    pub limit: usize,
+}
+
+impl Size {
+    /// A scene that comes in one size.
+    const FIXED: Self = Self::new("", 1, 1);
+
+    const fn new(meaning: &'static str, default: usize, limit: usize) -> Self {
+        Self { meaning, default, limit }
+    }
 }
 
 impl Scene {
@@ -27,7 +52,12 @@ impl Scene {
     /// # Errors
     /// If an option is out of its range or the machine lacks the SIMD level.
     pub fn build(&self, options: &SceneOptions) -> Result<BuiltScene, Error> {
-        (self.build)(options)
+        let size = options.size.unwrap_or(self.size.default);
+        if !(1..=self.size.limit).contains(&size) {
+            let high = self.size.limit as Real;
+            return Err(Error::OutOfRange { what: "size", value: size as Real, low: 1.0, high });
+        }
+        (self.build)(options, size)
     }
 }
 
@@ -74,151 +104,151 @@ pub static SCENES: &[Scene] = &[
     Scene {
         name: "colosseum_break",
         description: "8,817 stones in six rings stand for 2 s, then a ball of 200 t hits them at 40 m/s",
-        size_meaning: "layers, 6",
+        size: Size::new("layers", 6, 40),
         build: scenes::colosseum::colosseum_break,
     },
     Scene {
         name: "colosseum",
         description: "8,817 stones in six rings, standing (Jitter2's largest stack)",
-        size_meaning: "layers, 6",
+        size: Size::new("layers", 6, 40),
         build: scenes::colosseum::colosseum,
     },
     Scene {
         name: "large_pyramid",
         description: "5,050 cubes in one upright triangle of 100 rows (Box3D)",
-        size_meaning: "rows, 100",
+        size: Size::new("rows", 100, 1000),
         build: scenes::stacks::large_pyramid,
     },
     Scene {
         name: "many_pyramids",
         description: "14 × 14 small pyramids, 10,780 cubes (Box3D)",
-        size_meaning: "pyramids along a side, 14",
+        size: Size::new("pyramids along a side", 14, 100),
         build: scenes::stacks::many_pyramids,
     },
     Scene {
         name: "pyramid20",
         description: "an upright triangle of 20 rows with small gaps, 210 cubes (Jitter2)",
-        size_meaning: "rows, 20",
+        size: Size::new("rows", 20, 1000),
         build: scenes::stacks::gapped_pyramid,
     },
     Scene {
         name: "jolt_pyramid",
         description: "1,240 boxes dropped into a four-sided pyramid of 15 layers (Jolt)",
-        size_meaning: "layers, 15",
+        size: Size::new("layers", 15, 100),
         build: scenes::stacks::jolt_pyramid,
     },
     Scene {
         name: "wide_pyramid",
         description: "1,240 slightly smaller boxes dropped into a four-sided pyramid of 15 layers (Box3D)",
-        size_meaning: "layers, 15",
+        size: Size::new("layers", 15, 100),
         build: scenes::stacks::wide_pyramid,
     },
     Scene {
         name: "tower",
         description: "a round tower of 40 rings of 32 planks (Jitter2)",
-        size_meaning: "rings, 40",
+        size: Size::new("rings", 40, 10_000),
         build: scenes::stacks::tower,
     },
     Scene {
         name: "convex_pile",
         description: "5,120 rocks of 32 points fall into a heap (Box3D)",
-        size_meaning: "layers of 64 rocks, 80",
+        size: Size::new("layers of 64 rocks", 80, 10_000),
         build: scenes::piles::convex_pile,
     },
     Scene {
         name: "junkyard",
         description: "10,584 rocks fall into a yard where a pillar ploughs through them (Box3D)",
-        size_meaning: "layers of 441 rocks, 24",
+        size: Size::new("layers of 441 rocks", 24, 2000),
         build: scenes::piles::junkyard,
     },
     Scene {
         name: "convex_vs_mesh",
         description: "1,764 mixed bodies bounce on hills of 20,000 triangles (Jolt)",
-        size_meaning: "layers of 441 bodies, 4",
+        size: Size::new("layers of 441 bodies", 4, 2000),
         build: scenes::piles::convex_vs_mesh,
     },
     Scene {
         name: "mesh_rain",
         description: "2,048 mixed bodies rain on a wavy mesh",
-        size_meaning: "bodies, 2048",
+        size: Size::new("bodies", 2048, 1_000_000),
         build: scenes::piles::mesh_rain,
     },
     Scene {
         name: "mesh_rain10k",
         description: "10,000 mixed bodies rain on a wavy mesh",
-        size_meaning: "bodies, 10000",
-        build: scenes::piles::mesh_rain_10k,
+        size: Size::new("bodies", 10_000, 1_000_000),
+        build: scenes::piles::mesh_rain,
     },
     Scene {
         name: "spheres10k",
         description: "10,000 balls pour into a walled pit",
-        size_meaning: "balls, 10000",
+        size: Size::new("balls", 10_000, 1_000_000),
         build: scenes::piles::spheres,
     },
     Scene {
         name: "boxes_rain",
         description: "a small start: 400 boxes, balls, capsules and rocks fall into a tray",
-        size_meaning: "bodies, 400",
+        size: Size::new("bodies", 400, 1_000_000),
         build: scenes::piles::boxes_rain,
     },
     Scene {
         name: "washer",
         description: "8,000 small cubes in a turning drum with paddles (Box3D)",
-        size_meaning: "cubes along an edge, 20",
+        size: Size::new("cubes along an edge", 20, 100),
         build: scenes::drums::washer,
     },
     Scene {
         name: "rotating_cube",
         description: "8,000 boxes tumble in a turning hollow cube (Jitter2)",
-        size_meaning: "boxes along an edge, 20",
+        size: Size::new("boxes along an edge", 20, 100),
         build: scenes::drums::rotating_cube,
     },
     Scene {
         name: "large_world",
         description: "balls drop on a plain of 1,000,000 static bodies (Box3D)",
-        size_meaning: "static bodies along a side, 1000",
+        size: Size::new("static bodies along a side", 1000, 2000),
         build: scenes::fields::large_world,
     },
     Scene {
         name: "sleeping_field",
         description: "100,000 bodies asleep and 100 balls that never rest: what sleep costs",
-        size_meaning: "sleeping bodies, 100000",
+        size: Size::new("sleeping bodies", 100_000, 2_000_000),
         build: scenes::fields::sleeping_field,
     },
     Scene {
         name: "trees100",
         description: "50 falling trees of 22 hulls each on a wave of 60,000 triangles (Box3D)",
-        size_meaning: "trees, 50",
+        size: Size::new("trees", 50, 1000),
         build: scenes::trees::trees100,
     },
     Scene {
         name: "trees50",
         description: "the same on 240,000 triangles of half the width (Box3D)",
-        size_meaning: "trees, 50",
+        size: Size::new("trees", 50, 1000),
         build: scenes::trees::trees50,
     },
     Scene {
         name: "trees25",
         description: "the same on 960,000 triangles of a quarter of the width (Box3D)",
-        size_meaning: "trees, 50",
+        size: Size::new("trees", 50, 1000),
         build: scenes::trees::trees25,
     },
     Scene {
         name: "ramps",
         description: "boxes with friction 0, 0.1, … 1 on a slope of 30°: those above 0.577 stick",
-        size_meaning: "",
+        size: Size::FIXED,
         build: scenes::behaviour::ramps,
     },
     Scene {
         name: "bounce",
         description: "balls with restitution 0, 0.1, … 1 fall from the same height",
-        size_meaning: "",
+        size: Size::FIXED,
         build: scenes::behaviour::bounce,
     },
     Scene {
         name: "t_handle",
         description: "a T-shaped handle spins weightless and flips over 37 times in 20 s",
-        size_meaning: "",
+        size: Size::FIXED,
         build: scenes::behaviour::t_handle,
     },
 ];
@@ -234,6 +264,16 @@ mod tests {
             assert!(scene.name.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_'));
             assert!(!scene.description.is_empty() && !scene.description.contains('\n'));
         }
+    }
+
+    #[test]
+    fn sizes_out_of_range_are_refused() {
+        let size = |name: &str, size: usize| {
+            find(name).unwrap().build(&SceneOptions { size: Some(size), ..Default::default() })
+        };
+        assert!(matches!(size("large_pyramid", 1001), Err(Error::OutOfRange { what: "size", .. })));
+        assert!(size("large_pyramid", 0).is_err() && size("bounce", 2).is_err());
+        assert!(size("large_pyramid", 2).is_ok() && size("bounce", 1).is_ok());
     }
 
     #[test]

@@ -6,8 +6,8 @@ use crate::{BuiltScene, SceneOptions};
 use arbiter3d::{BodyDefinition, Error, Real, Rotation, Shape, ShapeDefinition, Vec3, WorldSettings};
 
 /// Eleven boxes with friction 0, 0.1, … 1 on a frictionless slope of 30° (whose tangent is 0.577).
-pub(crate) fn ramps(options: &SceneOptions) -> Result<BuiltScene, Error> {
-    let mut scene = Builder::new(options, 1)?;
+pub(crate) fn ramps(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
+    let mut scene = Builder::new(options, size)?;
     let turn = about(Vec3::Z, -30.0_f32.to_radians());
     let (along, normal) = {
         let rotation = Rotation::from_quat(turn);
@@ -26,9 +26,9 @@ pub(crate) fn ramps(options: &SceneOptions) -> Result<BuiltScene, Error> {
 }
 
 /// Eleven balls with restitution 0, 0.1, … 1 fall 5 m: each rises to the square of its restitution times 5 m.
-pub(crate) fn bounce(options: &SceneOptions) -> Result<BuiltScene, Error> {
+pub(crate) fn bounce(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
     const RADIUS: Real = 0.5;
-    let mut scene = Builder::new(options, 1)?;
+    let mut scene = Builder::new(options, size)?;
     let slab = ShapeDefinition::new(Shape::cuboid(Vec3::new(30.0, 1.0, 10.0))?);
     scene.add(&BodyDefinition::fixed().at(-Vec3::Y), &slab)?;
     for index in 0..=10 {
@@ -40,9 +40,9 @@ pub(crate) fn bounce(options: &SceneOptions) -> Result<BuiltScene, Error> {
 }
 
 /// PEEL's T-handle: two boxes of together 0.1 kg spin about the axis of middle inertia, which is unstable.
-pub(crate) fn t_handle(options: &SceneOptions) -> Result<BuiltScene, Error> {
+pub(crate) fn t_handle(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
     let weightless = WorldSettings { gravity: Vec3::ZERO, ..WorldSettings::default() };
-    let mut scene = Builder::with_settings(options, 1, weightless)?;
+    let mut scene = Builder::with_settings(options, size, weightless)?;
     // 0.1 kg over 0.01 + 0.002 m³.
     let density = 0.1 / 0.012;
     let spin = Vec3::new(7.5, 5.025, 0.0);

@@ -20,15 +20,15 @@ const INNER_RADIUS: Real = 15.0;
 const RING_PITCH: Real = STONE.z + 0.5;
 
 /// The colosseum alone, without sleeping.
-pub(crate) fn colosseum(options: &SceneOptions) -> Result<BuiltScene, Error> {
-    let mut scene = Builder::sleepless(options, 6)?;
+pub(crate) fn colosseum(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
+    let mut scene = Builder::sleepless(options, size)?;
     build(&mut scene)?;
     scene.finish(100)
 }
 
 /// The colosseum stands for 2 s; then a ball of 5 m radius and 200 t comes at 40 m/s.
-pub(crate) fn colosseum_break(options: &SceneOptions) -> Result<BuiltScene, Error> {
-    let mut scene = Builder::new(options, 6)?;
+pub(crate) fn colosseum_break(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
+    let mut scene = Builder::new(options, size)?;
     build(&mut scene)?;
     let steps_before = (2.0 * scene.hz + 0.5) as usize;
     let steps = (10.0 * scene.hz + 0.5) as usize;

@@ -7,8 +7,8 @@ use arbiter3d::{BodyDefinition, Error, Real, Shape, ShapeDefinition, Vec3};
 use std::f32::consts::PI;
 
 /// Box3D's `washer`: small cubes in a drum of 36 wedges and four paddles that turns at 25° a second.
-pub(crate) fn washer(options: &SceneOptions) -> Result<BuiltScene, Error> {
-    let mut scene = Builder::new(options, 20)?;
+pub(crate) fn washer(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
+    let mut scene = Builder::new(options, size)?;
     scene.ground(Vec3::new(60.0, 1.0, 60.0))?;
     let spin = Vec3::new(0.0, 0.0, 25.0_f32.to_radians());
     let drum = BodyDefinition::kinematic().at(Vec3::new(0.0, 21.0, 0.0)).moving(Vec3::new(0.001, -0.002, 0.0), spin);
@@ -62,9 +62,9 @@ fn wedge(angles: [Real; 2], radii: [Real; 2]) -> Result<ShapeDefinition, Error> 
 }
 
 /// Jitter2's `RotatingCube`: boxes of 1.5 m on a grid inside six plates of 50 m that turn together.
-pub(crate) fn rotating_cube(options: &SceneOptions) -> Result<BuiltScene, Error> {
+pub(crate) fn rotating_cube(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
     const HALF_WIDTH: Real = 25.0;
-    let mut scene = Builder::new(options, 20)?;
+    let mut scene = Builder::new(options, size)?;
     let turning = BodyDefinition::kinematic().moving(Vec3::ZERO, Vec3::new(0.14, 0.02, 0.03));
     let container = scene.world.add_body(&turning)?;
     for axis in [Vec3::Y, Vec3::X, Vec3::Z] {

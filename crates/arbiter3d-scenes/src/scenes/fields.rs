@@ -5,8 +5,8 @@ use crate::{BuiltScene, SceneOptions};
 use arbiter3d::{BodyDefinition, Error, Real, Shape, ShapeDefinition, Vec3, World};
 
 /// Box3D's `large_world`: 1,000 × 1,000 static slabs of 10 m; every fifth step a ball drops somewhere else.
-pub(crate) fn large_world(options: &SceneOptions) -> Result<BuiltScene, Error> {
-    let mut scene = Builder::new(options, 1000)?;
+pub(crate) fn large_world(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
+    let mut scene = Builder::new(options, size)?;
     let slab = cuboid(Vec3::new(5.0, 0.25, 5.0))?;
     let half_width = 5.0 * scene.size as Real;
     let place = |index: usize| -half_width + 10.0 * (index as Real + 0.5);
@@ -35,10 +35,10 @@ fn drop_ball(world: &mut World, ball: &ShapeDefinition, index: usize, half_width
 }
 
 /// Boxes that sleep from the start, 2 m apart, and beside them 100 balls that bounce for ever.
-pub(crate) fn sleeping_field(options: &SceneOptions) -> Result<BuiltScene, Error> {
+pub(crate) fn sleeping_field(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
     const AWAKE_SIDE: usize = 10;
     const SPACING: Real = 2.0;
-    let mut scene = Builder::new(options, 100_000)?;
+    let mut scene = Builder::new(options, size)?;
     let count = scene.size;
     let side = (count as Real).sqrt() as usize + 1;
     let half_width = 0.5 * SPACING * side as Real;

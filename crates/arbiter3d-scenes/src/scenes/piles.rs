@@ -7,9 +7,9 @@ use crate::{BuiltScene, SceneOptions};
 use arbiter3d::{BodyDefinition, BodyId, Error, Real, Shape, ShapeDefinition, Vec3, World};
 
 /// Box3D's `convex_pile`: 8 × 8 rocks a layer, all with the hull of the same 32 random points on a sphere of 2 m.
-pub(crate) fn convex_pile(options: &SceneOptions) -> Result<BuiltScene, Error> {
+pub(crate) fn convex_pile(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
     const RADIUS: Real = 2.0;
-    let mut scene = Builder::new(options, 80)?;
+    let mut scene = Builder::new(options, size)?;
     scene.ground(Vec3::new(250.0, 1.0, 250.0))?;
     let rock = plain(Shape::hull(&scene.random(42).points_on_sphere(32, RADIUS))?);
     for layer in 0..scene.size {
@@ -24,8 +24,8 @@ pub(crate) fn convex_pile(options: &SceneOptions) -> Result<BuiltScene, Error> {
 }
 
 /// Box3D's `junkyard`: 21 × 21 rocks a layer in a walled yard, and a pillar that circles through them at 6° a second.
-pub(crate) fn junkyard(options: &SceneOptions) -> Result<BuiltScene, Error> {
-    let mut scene = Builder::new(options, 24)?;
+pub(crate) fn junkyard(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
+    let mut scene = Builder::new(options, size)?;
     let ground = scene.world.add_body(&BodyDefinition::fixed().at(Vec3::new(0.0, -1.0, 0.0)))?;
     scene.world.add_shape(ground, &cuboid(Vec3::new(120.0, 1.0, 120.0))?)?;
     for side in [-50.0, 50.0] {
@@ -63,10 +63,10 @@ fn push(world: &mut World, pusher: BodyId, step: usize, hz: Real) -> Result<(), 
 }
 
 /// Jolt's `ConvexVsMesh`: 21 × 21 boxes, balls, capsules and pyramids, a layer each, on hills of 20,000 triangles.
-pub(crate) fn convex_vs_mesh(options: &SceneOptions) -> Result<BuiltScene, Error> {
+pub(crate) fn convex_vs_mesh(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
     const CELLS: usize = 100;
     let rough = |shape: Shape| ShapeDefinition::new(shape).friction(0.5).restitution(0.6);
-    let mut scene = Builder::new(options, 4)?;
+    let mut scene = Builder::new(options, size)?;
     let waves: Vec<(Real, Real)> = (0..=CELLS).map(|i| sin_cos(50.0 * i as Real / CELLS as Real)).collect();
     let corner = Vec3::new(-150.0, 5.0, -150.0);
     let (vertices, triangles) = surface(CELLS, CELLS, 3.0, corner, |i, j| 5.0 * waves[i].0 * waves[j].1);
@@ -91,18 +91,10 @@ pub(crate) fn convex_vs_mesh(options: &SceneOptions) -> Result<BuiltScene, Error
 }
 
 /// 16 × 16 mixed bodies a layer over a wavy mesh of 64 × 64 cells.
-pub(crate) fn mesh_rain(options: &SceneOptions) -> Result<BuiltScene, Error> {
-    rain_on_waves(Builder::new(options, 2048)?)
-}
-
-/// The same with 10,000 bodies.
-pub(crate) fn mesh_rain_10k(options: &SceneOptions) -> Result<BuiltScene, Error> {
-    rain_on_waves(Builder::new(options, 10_000)?)
-}
-
-fn rain_on_waves(mut scene: Builder) -> Result<BuiltScene, Error> {
+pub(crate) fn mesh_rain(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
     const CELLS: usize = 64;
     const SIDE: usize = 16;
+    let mut scene = Builder::new(options, size)?;
     let coordinate = |i: usize| i as Real - 0.5 * CELLS as Real;
     let along_x: Vec<Real> = (0..=CELLS).map(|i| sin_cos(0.3 * coordinate(i)).0).collect();
     let along_z: Vec<Real> = (0..=CELLS).map(|i| sin_cos(0.25 * coordinate(i)).1).collect();
@@ -137,8 +129,8 @@ fn tray(scene: &mut Builder, inner: Real, height: Real) -> Result<(), Error> {
 }
 
 /// 10,000 balls of half a metre pour into a pit: 20 × 20 a layer, every other layer shifted.
-pub(crate) fn spheres(options: &SceneOptions) -> Result<BuiltScene, Error> {
-    let mut scene = Builder::new(options, 10_000)?;
+pub(crate) fn spheres(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
+    let mut scene = Builder::new(options, size)?;
     tray(&mut scene, 15.0, 12.0)?;
     let ball = plain(Shape::sphere(0.5)?);
     let mut scatter = scene.scatter(0.1);
@@ -152,8 +144,8 @@ pub(crate) fn spheres(options: &SceneOptions) -> Result<BuiltScene, Error> {
 }
 
 /// A few hundred mixed bodies, turned at random, fall into a tray.
-pub(crate) fn boxes_rain(options: &SceneOptions) -> Result<BuiltScene, Error> {
-    let mut scene = Builder::new(options, 400)?;
+pub(crate) fn boxes_rain(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
+    let mut scene = Builder::new(options, size)?;
     tray(&mut scene, 8.0, 3.0)?;
     let mut random = scene.random(11);
     let mixed = Mixed::new(&mut random)?;

@@ -16,8 +16,8 @@ fn triangle(rows: usize) -> impl Iterator<Item = Vec3> {
 }
 
 /// Box3D's `large_pyramid`: 100 rows, cubes of 100 kg, no sleeping.
-pub(crate) fn large_pyramid(options: &SceneOptions) -> Result<BuiltScene, Error> {
-    let mut scene = Builder::sleepless(options, 100)?;
+pub(crate) fn large_pyramid(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
+    let mut scene = Builder::sleepless(options, size)?;
     scene.ground(Vec3::new(400.0, 1.0, 400.0))?;
     let cube = cuboid(Vec3::splat(0.5))?.density(100.0);
     for position in triangle(scene.size) {
@@ -27,9 +27,9 @@ pub(crate) fn large_pyramid(options: &SceneOptions) -> Result<BuiltScene, Error>
 }
 
 /// Box3D's `many_pyramids`: 14 × 14 triangles of 10 rows, no sleeping.
-pub(crate) fn many_pyramids(options: &SceneOptions) -> Result<BuiltScene, Error> {
+pub(crate) fn many_pyramids(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
     const ROWS: usize = 10;
-    let mut scene = Builder::sleepless(options, 14)?;
+    let mut scene = Builder::sleepless(options, size)?;
     let side = scene.size;
     let extent = 0.5 * side as Real * (ROWS as Real + 1.0);
     scene.ground(Vec3::new(extent, 1.0, extent))?;
@@ -49,8 +49,8 @@ pub(crate) fn many_pyramids(options: &SceneOptions) -> Result<BuiltScene, Error>
 }
 
 /// Jitter2's `Pyramid(n)`: unit boxes a hundredth apart, friction as the engine has it.
-pub(crate) fn gapped_pyramid(options: &SceneOptions) -> Result<BuiltScene, Error> {
-    let mut scene = Builder::new(options, 20)?;
+pub(crate) fn gapped_pyramid(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
+    let mut scene = Builder::new(options, size)?;
     scene.ground(Vec3::splat(100.0))?;
     let cube = cuboid(Vec3::splat(0.5))?;
     let rows = scene.size;
@@ -64,8 +64,8 @@ pub(crate) fn gapped_pyramid(options: &SceneOptions) -> Result<BuiltScene, Error
 }
 
 /// Jolt's `Pyramid`: boxes of 2 m a quarter of their height above each other, friction 0.2, no sleeping.
-pub(crate) fn jolt_pyramid(options: &SceneOptions) -> Result<BuiltScene, Error> {
-    let mut scene = Builder::sleepless(options, 15)?;
+pub(crate) fn jolt_pyramid(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
+    let mut scene = Builder::sleepless(options, size)?;
     let half_extents = Vec3::new(50.0, 1.0, 50.0);
     let ground = cuboid(half_extents)?.friction(0.2);
     scene.add(&BodyDefinition::fixed().at(Vec3::new(0.0, -1.0, 0.0)), &ground)?;
@@ -74,8 +74,8 @@ pub(crate) fn jolt_pyramid(options: &SceneOptions) -> Result<BuiltScene, Error> 
 }
 
 /// Box3D's wide pyramid: as Jolt's, with boxes a little smaller than their cells.
-pub(crate) fn wide_pyramid(options: &SceneOptions) -> Result<BuiltScene, Error> {
-    let mut scene = Builder::new(options, 15)?;
+pub(crate) fn wide_pyramid(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
+    let mut scene = Builder::new(options, size)?;
     scene.ground(Vec3::new(100.0, 1.0, 100.0))?;
     square_pyramid(&mut scene, &cuboid(Vec3::splat(0.975))?)?;
     scene.finish(500)
@@ -98,9 +98,9 @@ fn square_pyramid(scene: &mut Builder, cube: &ShapeDefinition) -> Result<(), Err
 }
 
 /// Jitter2's `Tower(n)`: rings of 32 planks of 3 × 1 × 0.5 m at radius 19.5, each ring turned by half a plank.
-pub(crate) fn tower(options: &SceneOptions) -> Result<BuiltScene, Error> {
+pub(crate) fn tower(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
     const PLANKS: usize = 32;
-    let mut scene = Builder::new(options, 40)?;
+    let mut scene = Builder::new(options, size)?;
     scene.ground(Vec3::splat(100.0))?;
     let plank = ShapeDefinition::new(Shape::cuboid(Vec3::new(1.5, 0.5, 0.25))?);
     for ring in 0..scene.size {

@@ -6,24 +6,24 @@ use crate::{BuiltScene, SceneOptions};
 use arbiter3d::{BodyDefinition, Error, Real, Shape, ShapeDefinition, Vec3, WorldSettings};
 
 /// Cells of 1 m.
-pub(crate) fn trees100(options: &SceneOptions) -> Result<BuiltScene, Error> {
-    trees(options, 1)
+pub(crate) fn trees100(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
+    trees(options, size, 1)
 }
 
 /// Cells of half a metre.
-pub(crate) fn trees50(options: &SceneOptions) -> Result<BuiltScene, Error> {
-    trees(options, 2)
+pub(crate) fn trees50(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
+    trees(options, size, 2)
 }
 
 /// Cells of a quarter of a metre.
-pub(crate) fn trees25(options: &SceneOptions) -> Result<BuiltScene, Error> {
-    trees(options, 4)
+pub(crate) fn trees25(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
+    trees(options, size, 4)
 }
 
-fn trees(options: &SceneOptions, scale: usize) -> Result<BuiltScene, Error> {
+fn trees(options: &SceneOptions, size: usize, scale: usize) -> Result<BuiltScene, Error> {
     // The published scene sets a sleep threshold of 0.2 m/s on each tree.
     let mut scene =
-        Builder::with_settings(options, 50, WorldSettings { sleep_speed: 0.2, ..WorldSettings::default() })?;
+        Builder::with_settings(options, size, WorldSettings { sleep_speed: 0.2, ..WorldSettings::default() })?;
     scene.mesh(wave(150 * scale, 200 * scale, 1.0 / scale as Real, 0.4, [0.1, 0.05]))?;
     let trunk = trunk()?;
     for index in 0..scene.size {
