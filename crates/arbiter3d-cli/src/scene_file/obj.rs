@@ -70,12 +70,12 @@ fn parse(text: &str) -> Result<(Vec<Vec3>, Vec<[u32; 3]>), Complaint> {
 
 /// Checks coordinates and face indices line by line.
 fn check_lines(text: &str) -> Result<(), Complaint> {
-    let mut vertices = 0;
+    let mut vertices = Vertices { so_far: 0, in_all: text.lines().filter(|line| is_vertex(line)).count() as i64 };
     for (index, line) in text.lines().enumerate() {
         let mut words = line.split('#').next().unwrap_or_default().split_whitespace();
         let checked = match words.next() {
             Some("v") => {
-                vertices += 1;
+                vertices.so_far += 1;
                 check_vertex(words)
             }
             Some("f") => check_face(words, vertices),
@@ -99,15 +99,33 @@ fn check_vertex<'a>(words: impl Iterator<Item = &'a str>) -> Result<(), String> 
     if count >= 3 { Ok(()) } else { Err(format!("a vertex needs three coordinates, this one has {count}")) }
 }
 
+/// How many vertices a face may refer to.
+#[derive(Clone, Copy)]
+struct Vertices {
+    so_far: i64,
+    in_all: i64,
+}
+
+fn is_vertex(line: &str) -> bool {
+    line.split_whitespace().next() == Some("v")
+}
+
 /// Indices count from 1; negative ones count back from the last vertex so far. Only those into the vertices matter.
-fn check_face<'a>(words: impl Iterator<Item = &'a str>, vertices: i64) -> Result<(), String> {
+fn check_face<'a>(words: impl Iterator<Item = &'a str>, vertices: Vertices) -> Result<(), String> {
     let mut corners = 0;
     for word in words {
         corners += 1;
         let index = word.split('/').next().unwrap_or_default();
         match index.parse::<i64>() {
-            Ok(index) if (1..=vertices).contains(&index) || (-vertices..=-1).contains(&index) => {}
-            Ok(index) => return Err(format!("face index {index} is out of range: {vertices} vertices stand above it")),
+            Ok(index) if (1..=vertices.in_all).contains(&index) || (-vertices.so_far..=-1).contains(&index) => {}
+            Ok(index) if index < 0 => {
+                let count = vertices.so_far;
+                return Err(format!("face index {index} is out of range: there are {count} vertices above this line"));
+            }
+            Ok(index) => {
+                let count = vertices.in_all;
+                return Err(format!("face index {index} is out of range: the file has {count} vertices"));
+            }
             Err(_) => return Err(format!("{word:?} is not a face index")),
         }
     }
@@ -158,6 +176,12 @@ mod tests {
     }
 
     #[test]
+    fn faces_may_stand_before_their_vertices() {
+        let (mesh, _) = mesh(&format!("f 1 2 3\n{SQUARE}"), &spec());
+        assert_eq!(mesh.triangles().len(), 1);
+    }
+
+    #[test]
     fn two_objects_make_one_mesh() {
         let text = format!("o a\n{SQUARE}f 1 2 3\no b\nv 9 0 0\nf 1 2 5\n");
         let (mesh, _) = mesh(&text, &spec());
@@ -172,7 +196,7 @@ mod tests {
             ("# a\nv 0 nan 0\n", 2, "not finite"),
             ("v 0 1e999 0\n", 1, "not finite"),
             ("v 0 zero 0\n", 1, "not a number"),
-            ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", 4, "face index 4 is out of range: 3 vertices"),
+            ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", 4, "face index 4 is out of range: the file has 3 vertices"),
             ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n", 4, "face index 0 is out of range"),
             ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf -1 -2 -4\n", 4, "face index -4"),
             ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2\n", 4, "three corners"),

@@ -25,7 +25,8 @@ pub(super) fn parse(text: &str) -> Result<SceneFile, (Place, String)> {
     let mut deserializer = serde_json::Deserializer::from_str(text);
     let scene = serde_path_to_error::deserialize(&mut deserializer).map_err(|error| {
         let path = error.path().to_string();
-        let place = if path == "." { String::new() } else { path };
+        // "." is the whole file, "?" a key that could not be read.
+        let place = path.trim_end_matches('?').trim_end_matches('.').to_owned();
         (Place(place), explain(error.inner(), text))
     })?;
     deserializer.end().map_err(|error| (Place::default(), explain(&error, text)))?;
