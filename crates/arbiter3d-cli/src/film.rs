@@ -110,7 +110,8 @@ impl Film {
             arbiter3d::BodyKind::Kinematic => BodyKind::Kinematic,
             arbiter3d::BodyKind::Dynamic => BodyKind::Dynamic,
         };
-        let body = self.recording.add_body(BodyInfo { kind, name: None });
+        let name = (id == BodyId::WORLD).then(|| "world".to_owned());
+        let body = self.recording.add_body(BodyInfo { kind, name });
         for shape in shapes.iter().filter_map(|&id| world.shape(id)) {
             let Some(geometry) = geometry(shape.geometry()) else { continue };
             let geometry = self.recording.add_geometry(geometry)?;
