@@ -1,10 +1,49 @@
 //! Arbiter: 3D rigid-body physics whose contacts live in open arbiters.
+//!
+//! Build a [`World`], add bodies and shapes, and step it:
+//!
+//! ```
+//! use arbiter3d::{BodyDefinition, BodyId, Shape, ShapeDefinition, World, math::Vec3};
+//!
+//! let mut world = World::default();
+//! let ground = Shape::cuboid(Vec3::new(50.0, 1.0, 50.0))?;
+//! world.add_shape(BodyId::WORLD, &ShapeDefinition::new(ground).at(Vec3::new(0.0, -1.0, 0.0)))?;
+//!
+//! let block = world.add_body(&BodyDefinition::dynamic().at(Vec3::new(0.0, 2.0, 0.0)))?;
+//! world.add_shape(block, &ShapeDefinition::new(Shape::cuboid(Vec3::splat(0.5))?))?;
+//!
+//! for _ in 0..120 {
+//!     world.step(1.0 / 60.0)?;
+//! }
+//! assert!((world.body(block).unwrap().position().y - 0.5).abs() < 0.01);
+//! # Ok::<(), arbiter3d::Error>(())
+//! ```
+//!
+//! What touches has an [`Arbiter`]: read it, edit it, make your own, and feed it contacts from any collision system of yours
+//! (see [`ContactProvider`]). The step gives the same bits for any number of threads and any [`SimdLevel`].
 
+mod arbiter;
+mod broad_phase;
+mod island;
 pub mod math;
 pub mod narrow_phase;
+mod parallel;
+mod query;
 mod shape;
+mod simd;
+mod solver;
+mod world;
 
+pub use arbiter::{Arbiter, ArbiterId, ArbiterKey, Contact, ContactData, ContactPoint, EndReason, SolveMode};
+pub use query::{Ray, ShapeHit, cast_ray};
 pub use shape::{
-    Capsule, ConvexHull, Cuboid, HalfEdge, MassProperties, MeshNode, MeshSides, Plane, Shape, ShapeError, Sphere,
-    TriangleMesh,
+    Capsule, ConvexHull, Cuboid, HalfEdge, MassProperties, MeshEdge, MeshNode, MeshRayHit, MeshSides, Plane, Shape,
+    ShapeError, Sphere, TriangleMesh,
+};
+pub use simd::{SimdLevel, UnknownSimdLevel};
+pub use world::{
+    BeginEvent, BeginListener, BodyDefinition, BodyId, BodyKind, BodyMut, BodyRef, CombineRule, ContactProvider,
+    EndEvent, EndListener, Error, Filter, LockedAxes, Material, Phase, QueryFilter, RayHit, SensorEvent,
+    ShapeDefinition, ShapeId, ShapeMut, ShapeRef, StepContext, StepReport, Timings, UNIT_TOLERANCE, World,
+    WorldSettings,
 };

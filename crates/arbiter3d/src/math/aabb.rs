@@ -106,10 +106,7 @@ impl Aabb {
     #[inline]
     #[must_use]
     pub fn sweep(&self, displacement: Vec3) -> Self {
-        Self {
-            min: self.min + min3(displacement, Vec3::ZERO),
-            max: self.max + max3(displacement, Vec3::ZERO),
-        }
+        Self { min: self.min + min3(displacement, Vec3::ZERO), max: self.max + max3(displacement, Vec3::ZERO) }
     }
 
     /// The box around this one placed by `pose`.

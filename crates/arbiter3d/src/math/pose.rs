@@ -91,13 +91,8 @@ impl Pose {
         let (p, q) = (self.rotation, end.rotation);
         Self {
             position: self.position + (end.position - self.position) * t,
-            rotation: Rotation::from_xyzw(
-                p.x * a + q.x * b,
-                p.y * a + q.y * b,
-                p.z * a + q.z * b,
-                p.w * a + q.w * b,
-            )
-            .normalize(),
+            rotation: Rotation::from_xyzw(p.x * a + q.x * b, p.y * a + q.y * b, p.z * a + q.z * b, p.w * a + q.w * b)
+                .normalize(),
         }
     }
 }

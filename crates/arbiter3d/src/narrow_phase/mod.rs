@@ -1,6 +1,34 @@
-//! Contacts between two shapes. (Kernels to come.)
+//! Contacts between two shapes: which points touch, along which normal, how deep.
+//!
+//! [`collide`] sorts a pair by the kind of its shapes, so that each kernel is written once, with the more complex
+//! shape in the role of shape 1: mesh, hull, cuboid, capsule, sphere. Where the caller's order is the other one, the
+//! result is mirrored.
+//!
+//! Every kernel keeps these laws:
+//! - all is in the frame of shape 1, so only the relative pose counts and a pair far from the origin loses no
+//! precision;
+//! - a normal is a finite unit vector from shape 1 to shape 2, even where centres coincide or edges are parallel;
+//! - all points of a convex pair have the bit-equal normal;
+//! - a manifold is complete in one call: up to four points, those within `margin` included, those beyond it left out;
+//! - shapes that overlap never give an empty manifold;
+//! - tolerances scale with the shapes, so a millimetre box behaves as a kilometre box.
 
+mod capsule;
+mod clip;
+mod cuboid;
+mod distance;
+mod hull;
 mod manifold;
+mod mesh;
+mod mesh_points;
+mod polyhedron;
+mod sphere;
+mod time_of_impact;
+mod triangle;
+mod triangle_solid;
+
+pub(crate) use distance::Support;
+pub(crate) use time_of_impact::{Sweep, time_of_impact};
 
 pub use manifold::{Manifold, ManifoldPoint};
 
@@ -10,15 +38,32 @@ use crate::shape::Shape;
 /// What a pair remembers between steps to find its contact faster: the last separating or reference feature.
 ///
 /// A cache never changes a result, only its cost: kernels verify what it suggests.
+///
+/// ```
+/// use arbiter3d::narrow_phase::PairCache;
+/// assert_eq!(PairCache::default().words, [0, 0]); // remembers nothing
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PairCache {
     /// Kernel-defined.
     pub words: [u32; 2],
 }
 
-/// Finds the contacts of two shapes that are closer than `margin`.
+/// Finds the contacts of two shapes that are closer than `margin` (metres, zero or more).
 ///
-/// `pose` places shape 2 in the frame of shape 1; the manifold is in that frame, its normals point from shape 1 to shape 2.
+/// `pose` places shape 2 in the frame of shape 1; the manifold is in that frame, its normals point from shape 1 to
+/// shape 2. Two meshes never touch.
+///
+/// ```
+/// use arbiter3d::{Shape, math::{Pose, Vec3}, narrow_phase::{Manifold, PairCache, collide}};
+/// let cube = Shape::cuboid(Vec3::ONE)?;
+/// let above = Pose::from_position(Vec3::new(0.0, 1.9, 0.0));
+/// let mut manifold = Manifold::EMPTY;
+/// collide(&cube, &cube, &above, 0.02, &mut PairCache::default(), &mut manifold);
+/// assert_eq!(manifold.points().len(), 4);
+/// assert!((manifold.points()[0].separation + 0.1).abs() < 1e-6);
+/// # Ok::<(), arbiter3d::ShapeError>(())
+/// ```
 pub fn collide(
     shape1: &Shape,
     shape2: &Shape,
@@ -27,6 +72,59 @@ pub fn collide(
     cache: &mut PairCache,
     manifold: &mut Manifold,
 ) {
-    let _ = (shape1, shape2, pose, margin, cache);
-    manifold.clear();
+    if rank(shape1) >= rank(shape2) {
+        collide_sorted(shape1, shape2, pose, margin, cache, manifold);
+    } else {
+        collide_sorted(shape2, shape1, &pose.inverse(), margin, cache, manifold);
+        mirror(pose, manifold);
+    }
 }
+
+/// The shape with the higher rank plays shape 1.
+#[inline(always)]
+fn rank(shape: &Shape) -> u8 {
+    match shape {
+        Shape::Sphere(_) => 0,
+        Shape::Capsule(_) => 1,
+        Shape::Cuboid(_) => 2,
+        Shape::Hull(_) => 3,
+        Shape::Mesh(_) => 4,
+    }
+}
+
+#[inline(always)]
+fn collide_sorted(
+    shape1: &Shape,
+    shape2: &Shape,
+    pose: &Pose,
+    margin: Real,
+    cache: &mut PairCache,
+    manifold: &mut Manifold,
+) {
+    match (shape1, shape2) {
+        (Shape::Cuboid(a), Shape::Cuboid(b)) => cuboid::cuboid_cuboid(a, b, pose, margin, cache, manifold),
+        (Shape::Sphere(a), Shape::Sphere(b)) => sphere::sphere_sphere(a, b, pose, margin, manifold),
+        (Shape::Capsule(a), Shape::Sphere(b)) => sphere::capsule_sphere(a, b, pose, margin, manifold),
+        (Shape::Cuboid(a), Shape::Sphere(b)) => sphere::cuboid_sphere(a, b, pose, margin, manifold),
+        (Shape::Capsule(a), Shape::Capsule(b)) => capsule::capsule_capsule(a, b, pose, margin, manifold),
+        (Shape::Cuboid(a), Shape::Capsule(b)) => capsule::cuboid_capsule(a, b, pose, margin, manifold),
+        (Shape::Hull(a), Shape::Sphere(b)) => sphere::hull_sphere(a, b, pose, margin, manifold),
+        (Shape::Hull(a), Shape::Capsule(b)) => capsule::hull_capsule(a, b, pose, margin, manifold),
+        (Shape::Hull(a), Shape::Cuboid(b)) => hull::hull_cuboid(a, b, pose, margin, (cache, manifold)),
+        (Shape::Hull(a), Shape::Hull(b)) => hull::hull_hull(a, b, pose, margin, (cache, manifold)),
+        (Shape::Mesh(_), Shape::Mesh(_)) => manifold.clear(),
+        (Shape::Mesh(a), convex) => mesh::collide(a, convex, pose, margin, cache, manifold),
+        _ => manifold.clear(),
+    }
+}
+
+/// Swaps the roles: what was found in the frame of shape 2 (as shape 1), told in the frame of shape 1.
+fn mirror(pose: &Pose, manifold: &mut Manifold) {
+    for point in manifold.points_mut() {
+        point.point1 = pose.transform_point(point.point2());
+        point.normal = -pose.rotation.rotate(point.normal);
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -78,8 +78,7 @@ impl Capsule {
         let cylinder = density * pi * r * r * h;
         let sphere = density * (4.0 / 3.0) * pi * r * r * r;
         let along = 0.5 * cylinder * r * r + 0.4 * sphere * r * r;
-        let across = cylinder * (r * r / 4.0 + h * h / 12.0)
-            + sphere * (0.4 * r * r + 0.25 * h * h + 0.375 * h * r);
+        let across = cylinder * (r * r / 4.0 + h * h / 12.0) + sphere * (0.4 * r * r + 0.25 * h * h + 0.375 * h * r);
         MassProperties {
             mass: cylinder + sphere,
             center: Vec3::ZERO,

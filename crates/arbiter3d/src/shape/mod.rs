@@ -6,15 +6,20 @@
 mod capsule;
 mod cuboid;
 mod hull;
+mod hull_builder;
+mod hull_merge;
 mod mass;
 mod mesh;
+mod mesh_edges;
+mod mesh_tree;
 mod sphere;
 
 pub use capsule::Capsule;
 pub use cuboid::Cuboid;
 pub use hull::{ConvexHull, HalfEdge, Plane};
 pub use mass::MassProperties;
-pub use mesh::{MeshNode, MeshSides, TriangleMesh};
+pub(crate) use mesh::Facet;
+pub use mesh::{MeshEdge, MeshNode, MeshRayHit, MeshSides, TriangleMesh};
 pub use sphere::Sphere;
 
 use crate::math::{Aabb, Pose, Real, Vec3};
@@ -59,10 +64,16 @@ pub enum ShapeError {
     TooManyFeatures {
         /// "vertices", "faces" or "edges".
         what: &'static str,
-        /// How many it would need.
+        /// How many it would need, at least.
         count: usize,
         /// How many it may have.
         limit: usize,
+    },
+    /// A hull so small or large that its volume or inertia overflows or vanishes.
+    #[error("the hull is {size} m large: its volume and inertia do not fit single precision; use 1e-7 m to 1e7 m")]
+    SizeOutOfRange {
+        /// Its largest extent, metres.
+        size: Real,
     },
     /// A mesh without triangles.
     #[error("the mesh has no triangles")]

@@ -39,10 +39,6 @@ impl Sphere {
     pub(crate) fn mass_properties(&self, density: Real) -> MassProperties {
         let r = self.radius;
         let mass = density * (4.0 / 3.0) * std::f32::consts::PI as Real * r * r * r;
-        MassProperties {
-            mass,
-            center: Vec3::ZERO,
-            inertia: SymmetricMat3::diagonal(Vec3::splat(0.4 * mass * r * r)),
-        }
+        MassProperties { mass, center: Vec3::ZERO, inertia: SymmetricMat3::diagonal(Vec3::splat(0.4 * mass * r * r)) }
     }
 }

@@ -1,0 +1,289 @@
+//! The contact state of one arbiter: four slots and what they share.
+//!
+//! Layout: the four slots stand in the record itself, so that one arbiter is one run of memory for the solver to gather.
+//! Anchors are kept in body axes from each body's centre of mass, so that a contact moves with its bodies and its gap can be
+//! read off at any time without asking the shapes.
+
+use super::SolveMode;
+use crate::math::{Real, Vec3};
+use crate::world::{Error, error};
+
+/// Slots of an arbiter.
+pub(crate) const SLOTS: usize = 4;
+
+/// One point of an arbiter.
+///
+/// ```
+/// # use arbiter3d::*;
+/// # fn show(arbiter: &Arbiter) {
+/// for (slot, contact) in arbiter.data().contacts() {
+///     println!("slot {slot}: gap {} m, impulse {} N s", contact.separation(), contact.normal_impulse());
+/// }
+/// # }
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Contact {
+    pub(crate) local_anchor1: Vec3,
+    pub(crate) local_anchor2: Vec3,
+    /// World normal from body 1 to body 2, as of the last step or registration.
+    pub(crate) normal: Vec3,
+    /// The normal in the axes of body 1: what the engine's contacts turn with between full updates.
+    pub(crate) local_normal: Vec3,
+    pub(crate) separation: Real,
+    /// Normal impulse of the last substep: what warm starting begins with.
+    pub(crate) normal_impulse: Real,
+    /// Sum of the normal impulses of the last step's substeps.
+    pub(crate) total_impulse: Real,
+    pub(crate) tangent_impulse: Vec3,
+    pub(crate) twist_impulse: Real,
+    pub(crate) feature: u32,
+    /// Velocity parts that this contact leaves alone.
+    pub(crate) remove: SolveMode,
+    /// Whether the normal keeps its world direction instead of turning with body 1: contacts that users registered.
+    pub(crate) world_normal: bool,
+}
+
+impl Contact {
+    /// Unit normal from body 1 to body 2, world axes.
+    #[must_use]
+    pub fn normal(&self) -> Vec3 {
+        self.normal
+    }
+
+    /// Gap along the normal, metres, as of the last step; negative when the bodies overlap.
+    #[must_use]
+    pub fn separation(&self) -> Real {
+        self.separation
+    }
+
+    /// Impulse along the normal that the last substep applied, N s; zero or more.
+    #[must_use]
+    pub fn normal_impulse(&self) -> Real {
+        self.normal_impulse
+    }
+
+    /// Impulse along the normal over the whole last step, N s.
+    #[must_use]
+    pub fn total_normal_impulse(&self) -> Real {
+        self.total_impulse
+    }
+
+    /// This contact's share of the arbiter's friction impulse in the last substep, N s, world axes.
+    #[must_use]
+    pub fn tangent_impulse(&self) -> Vec3 {
+        self.tangent_impulse
+    }
+
+    /// The point on body 1, from its centre of mass, in its axes, metres.
+    #[must_use]
+    pub fn local_anchor1(&self) -> Vec3 {
+        self.local_anchor1
+    }
+
+    /// The point on body 2, from its centre of mass, in its axes, metres.
+    #[must_use]
+    pub fn local_anchor2(&self) -> Vec3 {
+        self.local_anchor2
+    }
+
+    /// Velocity parts that this contact leaves alone.
+    #[must_use]
+    pub fn removed(&self) -> SolveMode {
+        self.remove
+    }
+
+    /// Takes over the impulses of the contact that this one replaces, the tangential one turned into the new plane.
+    pub(crate) fn inherit(&mut self, old: &Self) {
+        self.normal_impulse = old.normal_impulse;
+        self.total_impulse = old.total_impulse;
+        self.twist_impulse = old.twist_impulse;
+        self.tangent_impulse = old.tangent_impulse - self.normal * self.normal.dot(old.tangent_impulse);
+    }
+
+    /// Forgets the impulses.
+    pub(crate) fn reset_impulses(&mut self) {
+        self.normal_impulse = 0.0;
+        self.total_impulse = 0.0;
+        self.twist_impulse = 0.0;
+        self.tangent_impulse = Vec3::ZERO;
+    }
+}
+
+/// Contact state of an arbiter: four slots, and the material that they share.
+///
+/// Changes last as long as the arbiter, and count from the next solve on; those made while its begin is raised count in that
+/// very step.
+///
+/// ```
+/// use arbiter3d::{World, math::Vec3};
+/// let mut world = World::default();
+/// world.on_begin_collide(Box::new(|context, id| {
+///     if let Some(arbiter) = context.arbiter_mut(id) {
+///         let _ = arbiter.data_mut().set_friction(0.0); // ice
+///     }
+/// }));
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ContactData {
+    pub(crate) slots: [Contact; SLOTS],
+    pub(crate) usage_mask: u8,
+    pub(crate) solve_mode: SolveMode,
+    pub(crate) flags: u8,
+    pub(crate) friction: Real,
+    pub(crate) restitution: Real,
+    pub(crate) rolling_resistance: Real,
+    /// Surface velocity of body 2 against body 1, world axes.
+    pub(crate) tangent_velocity: Vec3,
+    pub(crate) rolling_impulse: Vec3,
+}
+
+/// The user has set the friction: materials no longer reach it.
+pub(crate) const FRICTION_OVERRIDDEN: u8 = 1;
+/// The user has set the restitution.
+pub(crate) const RESTITUTION_OVERRIDDEN: u8 = 2;
+/// The user has set the surface velocity.
+pub(crate) const TANGENT_VELOCITY_OVERRIDDEN: u8 = 4;
+/// The user has set the rolling resistance.
+pub(crate) const ROLLING_OVERRIDDEN: u8 = 8;
+
+impl ContactData {
+    /// Bits 0 to 3: the slot holds a contact. Bits 4 to 7: the slot was solved in the last step.
+    #[must_use]
+    pub fn usage_mask(&self) -> u8 {
+        self.usage_mask
+    }
+
+    /// The contact in a slot (0 to 3), if it holds one.
+    #[must_use]
+    pub fn contact(&self, slot: usize) -> Option<&Contact> {
+        (slot < SLOTS && self.usage_mask >> slot & 1 == 1).then(|| &self.slots[slot])
+    }
+
+    /// Slots that hold contacts, with the contacts.
+    pub fn contacts(&self) -> impl Iterator<Item = (usize, &Contact)> {
+        self.slots.iter().enumerate().filter(|(slot, _)| self.usage_mask >> slot & 1 == 1)
+    }
+
+    /// Number of contacts, 0 to 4.
+    #[must_use]
+    pub fn contact_count(&self) -> usize {
+        (self.usage_mask & 15).count_ones() as usize
+    }
+
+    /// Coulomb friction. Starts as the combination of the two materials, the maximum by default.
+    #[must_use]
+    pub fn friction(&self) -> Real {
+        self.friction
+    }
+
+    /// Share of the approach speed given back. Starts as the combination of the two materials, the maximum by default.
+    #[must_use]
+    pub fn restitution(&self) -> Real {
+        self.restitution
+    }
+
+    /// Torque that resists rolling, as a share of normal force times radius, metres.
+    #[must_use]
+    pub fn rolling_resistance(&self) -> Real {
+        self.rolling_resistance
+    }
+
+    /// Velocity of the surface of body 1 that carries body 2 along, m/s, world axes.
+    #[must_use]
+    pub fn tangent_velocity(&self) -> Vec3 {
+        self.tangent_velocity
+    }
+
+    /// What the arbiter may change of its bodies.
+    #[must_use]
+    pub fn solve_mode(&self) -> SolveMode {
+        self.solve_mode
+    }
+
+    /// Sets the friction for the arbiter's life.
+    ///
+    /// # Errors
+    /// If it is not from 0 to 10⁶.
+    pub fn set_friction(&mut self, friction: Real) -> Result<(), Error> {
+        self.friction = error::in_range("friction", friction, 0.0, 1e6)?;
+        self.flags |= FRICTION_OVERRIDDEN;
+        Ok(())
+    }
+
+    /// Sets the restitution for the arbiter's life.
+    ///
+    /// # Errors
+    /// If it is not from 0 to 1.
+    pub fn set_restitution(&mut self, restitution: Real) -> Result<(), Error> {
+        self.restitution = error::in_range("restitution", restitution, 0.0, 1.0)?;
+        self.flags |= RESTITUTION_OVERRIDDEN;
+        Ok(())
+    }
+
+    /// Sets the rolling resistance for the arbiter's life: a share of the normal force, times a radius, metres.
+    ///
+    /// # Errors
+    /// If it is not from 0 to 10⁶.
+    pub fn set_rolling_resistance(&mut self, rolling_resistance: Real) -> Result<(), Error> {
+        self.rolling_resistance = error::in_range("rolling_resistance", rolling_resistance, 0.0, 1e6)?;
+        self.flags |= ROLLING_OVERRIDDEN;
+        Ok(())
+    }
+
+    /// Sets the surface velocity (m/s, world axes) with which body 1 carries body 2 along.
+    ///
+    /// # Errors
+    /// If it is not finite.
+    pub fn set_tangent_velocity(&mut self, velocity: Vec3) -> Result<(), Error> {
+        self.tangent_velocity = error::finite_vec("tangent_velocity", velocity)?;
+        self.flags |= TANGENT_VELOCITY_OVERRIDDEN;
+        Ok(())
+    }
+
+    /// Sets what the arbiter may change of its bodies; parts of bodies that are not dynamic never change anyway.
+    pub fn set_solve_mode(&mut self, mode: SolveMode) {
+        self.solve_mode = mode;
+    }
+
+    /// Turns the normal of a contact; it points from body 1 to body 2, world axes.
+    ///
+    /// # Errors
+    /// If the slot is empty or the normal is not finite and of unit length.
+    pub fn set_normal(&mut self, slot: usize, normal: Vec3) -> Result<(), Error> {
+        let normal = error::unit_vec("normal", normal)?;
+        let contact = self.slot_mut(slot)?;
+        contact.normal = normal;
+        contact.world_normal = true;
+        contact.tangent_impulse -= normal * normal.dot(contact.tangent_impulse);
+        Ok(())
+    }
+
+    /// Removes a contact from its slot.
+    ///
+    /// # Errors
+    /// If the slot is empty.
+    pub fn remove_contact(&mut self, slot: usize) -> Result<(), Error> {
+        self.slot_mut(slot)?;
+        self.usage_mask &= !(1 << slot);
+        Ok(())
+    }
+
+    /// Forgets the accumulated impulses, so that the next step starts without them.
+    pub fn reset_impulses(&mut self) {
+        self.slots.iter_mut().for_each(Contact::reset_impulses);
+        self.rolling_impulse = Vec3::ZERO;
+    }
+
+    /// Removes all contacts.
+    pub fn clear(&mut self) {
+        self.usage_mask = 0;
+    }
+
+    fn slot_mut(&mut self, slot: usize) -> Result<&mut Contact, Error> {
+        if slot < SLOTS && self.usage_mask >> slot & 1 == 1 {
+            Ok(&mut self.slots[slot])
+        } else {
+            Err(Error::EmptySlot { slot, mask: self.usage_mask & 15 })
+        }
+    }
+}

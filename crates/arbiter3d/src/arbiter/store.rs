@@ -1,0 +1,425 @@
+//! Where arbiters live: a pool with stable places, found by key, by body or by id.
+//!
+//! A place is reused after its arbiter has ended; the generation in the [`ArbiterId`] then differs, so an old id finds
+//! nothing. The arbiters of a body hang on a doubly linked list through the records themselves, so that a world in steady
+//! state allocates nothing while contacts come and go. The solver walks `awake`, the live arbiters of awake bodies in the
+//! order of their keys: the order of solving then depends on names, not on history.
+
+use super::contact_data::ContactData;
+use super::key::ArbiterKey;
+use crate::world::BodyId;
+use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
+
+/// "None" among indices.
+pub(crate) const NONE: u32 = u32::MAX;
+
+/// Names an arbiter for as long as it lives.
+///
+/// ```
+/// use arbiter3d::{ArbiterKey, BodyDefinition, BodyId, World};
+/// let mut world = World::default();
+/// let body = world.add_body(&BodyDefinition::dynamic())?;
+/// let id = world.get_or_create_arbiter(ArbiterKey::new(7, 8), BodyId::WORLD, body)?;
+/// world.remove_arbiter(id)?;
+/// assert!(world.arbiter_by_id(id).is_none());
+/// # Ok::<(), arbiter3d::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ArbiterId {
+    pub(crate) index: u32,
+    pub(crate) generation: u32,
+}
+
+/// Why an arbiter ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum EndReason {
+    /// Its contacts broke and its shapes do not overlap.
+    Separated,
+    /// [`World::remove_arbiter`](crate::World::remove_arbiter).
+    ArbiterRemoved,
+    /// One of its shapes was removed.
+    ShapeRemoved,
+    /// One of its bodies was removed.
+    BodyRemoved,
+    /// One of its bodies was disabled.
+    BodyDisabled,
+    /// One of its bodies changed its kind.
+    KindChanged,
+    /// A filter or a sensor flag changed so that its shapes no longer collide.
+    FilterChanged,
+    /// The world was cleared.
+    WorldCleared,
+}
+
+/// The contact state of one pair: a key, two bodies and the contact data.
+///
+/// ```
+/// use arbiter3d::{ArbiterKey, BodyDefinition, BodyId, ContactPoint, World, math::Vec3};
+/// let mut world = World::default();
+/// let body = world.add_body(&BodyDefinition::dynamic())?;
+/// let key = ArbiterKey::new(1_000_000, 1);
+/// let point = ContactPoint::new(Vec3::ZERO, Vec3::ZERO, Vec3::Y);
+/// world.register_contact_by_key(key, BodyId::WORLD, body, point)?;
+/// assert_eq!(world.arbiter(key).unwrap().data().contact_count(), 1);
+/// # Ok::<(), arbiter3d::Error>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Arbiter {
+    pub(crate) data: ContactData,
+    pub(crate) key: ArbiterKey,
+    pub(crate) body1: BodyId,
+    pub(crate) body2: BodyId,
+    pub(crate) id: ArbiterId,
+    /// The broad-phase pair it belongs to; `NONE` for custom arbiters.
+    pub(crate) pair: u32,
+    pub(crate) alive: bool,
+    /// Whether the begin has been raised.
+    pub(crate) begun: bool,
+    /// Whether one of its bodies is awake.
+    pub(crate) awake: bool,
+    /// Neighbours in the lists of body 1 and body 2, as `index * 2 + side`.
+    next: [u32; 2],
+    previous: [u32; 2],
+}
+
+impl Arbiter {
+    /// Names this arbiter while it lives.
+    #[must_use]
+    pub fn id(&self) -> ArbiterId {
+        self.id
+    }
+
+    /// Its key.
+    #[must_use]
+    pub fn key(&self) -> ArbiterKey {
+        self.key
+    }
+
+    /// The body that normals point away from.
+    #[must_use]
+    pub fn body1(&self) -> BodyId {
+        self.body1
+    }
+
+    /// The body that normals point to.
+    #[must_use]
+    pub fn body2(&self) -> BodyId {
+        self.body2
+    }
+
+    /// The other body; `None` when `body` is neither.
+    #[must_use]
+    pub fn other_body(&self, body: BodyId) -> Option<BodyId> {
+        if body == self.body1 {
+            Some(self.body2)
+        } else {
+            (body == self.body2).then_some(self.body1)
+        }
+    }
+
+    /// Whether the engine made it for two shapes, rather than a user.
+    #[must_use]
+    pub fn is_of_shapes(&self) -> bool {
+        self.pair != NONE
+    }
+
+    /// Contacts and material.
+    #[must_use]
+    pub fn data(&self) -> &ContactData {
+        &self.data
+    }
+
+    /// Contacts and material, to change.
+    pub fn data_mut(&mut self) -> &mut ContactData {
+        &mut self.data
+    }
+}
+
+/// Multiply-and-rotate hashing: keys are ids, not attacks.
+#[derive(Default)]
+pub(crate) struct IdHasher(u64);
+
+impl Hasher for IdHasher {
+    fn finish(&self) -> u64 {
+        self.0 ^ self.0 >> 32
+    }
+
+    fn write(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            self.write_u64(u64::from(byte));
+        }
+    }
+
+    fn write_u64(&mut self, n: u64) {
+        self.0 = (self.0.rotate_left(26) ^ n).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    }
+}
+
+/// A map whose keys are ids.
+pub(crate) type IdMap<K, V> = HashMap<K, V, BuildHasherDefault<IdHasher>>;
+
+/// The pool of arbiters.
+#[derive(Debug, Default)]
+pub(crate) struct ArbiterStore {
+    /// Where generations start.
+    tag: u32,
+    arbiters: Vec<Arbiter>,
+    free: Vec<u32>,
+    by_key: IdMap<ArbiterKey, u32>,
+    /// First list entry of each body, by body index.
+    heads: Vec<u32>,
+    /// Live arbiters of awake bodies: `sorted` in key order, `fresh` not merged yet.
+    sorted: Vec<(ArbiterKey, u32)>,
+    fresh: Vec<(ArbiterKey, u32)>,
+    merged: Vec<(ArbiterKey, u32)>,
+    stale: bool,
+}
+
+impl ArbiterStore {
+    /// An empty pool whose generations start at `tag`.
+    pub fn new(tag: u32) -> Self {
+        Self { tag, ..Self::default() }
+    }
+
+    /// Number of live arbiters.
+    pub fn len(&self) -> usize {
+        self.by_key.len()
+    }
+
+    /// The arbiter at a place that is known to be live.
+    #[inline(always)]
+    pub fn at(&self, index: u32) -> &Arbiter {
+        &self.arbiters[index as usize]
+    }
+
+    /// The same, to change.
+    #[inline(always)]
+    pub fn at_mut(&mut self, index: u32) -> &mut Arbiter {
+        &mut self.arbiters[index as usize]
+    }
+
+    /// All places, live or not.
+    pub fn slots(&self) -> &[Arbiter] {
+        &self.arbiters
+    }
+
+    /// All places, live or not.
+    pub fn slots_mut(&mut self) -> &mut [Arbiter] {
+        &mut self.arbiters
+    }
+
+    /// Live arbiters, by place.
+    pub fn iter(&self) -> impl Iterator<Item = &Arbiter> {
+        self.arbiters.iter().filter(|a| a.alive)
+    }
+
+    /// The place of the live arbiter with this id.
+    pub fn index_of(&self, id: ArbiterId) -> Option<u32> {
+        let arbiter = self.arbiters.get(id.index as usize)?;
+        (arbiter.alive && arbiter.id == id).then_some(id.index)
+    }
+
+    /// The place of the live arbiter with this key.
+    pub fn find(&self, key: ArbiterKey) -> Option<u32> {
+        self.by_key.get(&key).copied()
+    }
+
+    /// Makes an arbiter; the key must be free and the bodies different.
+    pub fn create(&mut self, key: ArbiterKey, body1: BodyId, body2: BodyId) -> u32 {
+        let index = self.free.pop().unwrap_or_else(|| {
+            let index = u32::try_from(self.arbiters.len()).unwrap_or(NONE);
+            self.arbiters.push(Arbiter {
+                data: ContactData::default(),
+                key,
+                body1,
+                body2,
+                id: ArbiterId { index, generation: self.tag },
+                pair: NONE,
+                alive: false,
+                begun: false,
+                awake: false,
+                next: [NONE; 2],
+                previous: [NONE; 2],
+            });
+            index
+        });
+        let arbiter = &mut self.arbiters[index as usize];
+        arbiter.id.generation = arbiter.id.generation.wrapping_add(1);
+        (arbiter.key, arbiter.body1, arbiter.body2) = (key, body1, body2);
+        (arbiter.alive, arbiter.begun, arbiter.awake, arbiter.pair) = (true, false, false, NONE);
+        arbiter.data = ContactData::default();
+        self.by_key.insert(key, index);
+        self.link(index, 0, body1.index);
+        self.link(index, 1, body2.index);
+        self.set_awake(index, true);
+        index
+    }
+
+    /// Ends an arbiter; its place goes back to the pool.
+    pub fn remove(&mut self, index: u32) {
+        let arbiter = &mut self.arbiters[index as usize];
+        debug_assert!(arbiter.alive);
+        arbiter.alive = false;
+        arbiter.awake = false;
+        let (key, body1, body2) = (arbiter.key, arbiter.body1.index, arbiter.body2.index);
+        self.by_key.remove(&key);
+        self.unlink(index, 0, body1);
+        self.unlink(index, 1, body2);
+        self.free.push(index);
+        self.stale = true;
+    }
+
+    /// Puts an arbiter among those that are solved, or takes it out.
+    pub fn set_awake(&mut self, index: u32, awake: bool) {
+        let arbiter = &mut self.arbiters[index as usize];
+        if arbiter.awake != awake {
+            arbiter.awake = awake;
+            if awake {
+                self.fresh.push((arbiter.key, index));
+            } else {
+                self.stale = true;
+            }
+        }
+    }
+
+    /// Brings the solving order up to date and returns it: places of awake arbiters by key.
+    pub fn awake_by_key(&mut self) -> &[(ArbiterKey, u32)] {
+        if self.stale || !self.fresh.is_empty() {
+            self.fresh.sort_unstable();
+            let arbiters = &self.arbiters;
+            let live = |entry: &&(ArbiterKey, u32)| {
+                let arbiter = &arbiters[entry.1 as usize];
+                arbiter.awake && arbiter.key == entry.0
+            };
+            self.merged.clear();
+            let mut fresh = self.fresh.iter().filter(live).peekable();
+            for entry in self.sorted.iter().filter(live) {
+                while let Some(new) = fresh.next_if(|new| *new <= entry) {
+                    push_unique(&mut self.merged, *new);
+                }
+                push_unique(&mut self.merged, *entry);
+            }
+            for new in fresh {
+                push_unique(&mut self.merged, *new);
+            }
+            std::mem::swap(&mut self.sorted, &mut self.merged);
+            self.fresh.clear();
+            self.stale = false;
+        }
+        &self.sorted
+    }
+
+    /// The solving order as of the last [`ArbiterStore::awake_by_key`].
+    pub fn order(&self) -> &[(ArbiterKey, u32)] {
+        &self.sorted
+    }
+
+    /// Both the solving order and the places, to change.
+    pub fn order_and_slots_mut(&mut self) -> (&[(ArbiterKey, u32)], &mut [Arbiter]) {
+        (&self.sorted, &mut self.arbiters)
+    }
+
+    /// Places of the arbiters of a body.
+    pub fn of_body(&self, body: u32) -> impl Iterator<Item = u32> + '_ {
+        let first = self.heads.get(body as usize).copied().unwrap_or(NONE);
+        let mut edge = first;
+        std::iter::from_fn(move || {
+            if edge == NONE {
+                return None;
+            }
+            let index = edge >> 1;
+            edge = self.arbiters[index as usize].next[(edge & 1) as usize];
+            Some(index)
+        })
+    }
+
+    fn link(&mut self, index: u32, side: u32, body: u32) {
+        if self.heads.len() <= body as usize {
+            self.heads.resize(body as usize + 1, NONE);
+        }
+        let edge = index * 2 + side;
+        let head = std::mem::replace(&mut self.heads[body as usize], edge);
+        let arbiter = &mut self.arbiters[index as usize];
+        arbiter.next[side as usize] = head;
+        arbiter.previous[side as usize] = NONE;
+        if head != NONE {
+            self.arbiters[(head >> 1) as usize].previous[(head & 1) as usize] = edge;
+        }
+    }
+
+    fn unlink(&mut self, index: u32, side: u32, body: u32) {
+        let arbiter = &self.arbiters[index as usize];
+        let (next, previous) = (arbiter.next[side as usize], arbiter.previous[side as usize]);
+        if next != NONE {
+            self.arbiters[(next >> 1) as usize].previous[(next & 1) as usize] = previous;
+        }
+        if previous == NONE {
+            self.heads[body as usize] = next;
+        } else {
+            self.arbiters[(previous >> 1) as usize].next[(previous & 1) as usize] = next;
+        }
+    }
+
+    /// Checks every invariant; the message says which is broken.
+    pub fn validate(&self) -> Result<(), String> {
+        let live = self.iter().count();
+        if live != self.by_key.len() || live + self.free.len() != self.arbiters.len() {
+            return Err(format!("{live} live arbiters, {} keys, {} free", self.by_key.len(), self.free.len()));
+        }
+        for arbiter in self.iter() {
+            if self.by_key.get(&arbiter.key) != Some(&arbiter.id.index) {
+                return Err(format!("{:?} is not found by its key", arbiter.id));
+            }
+            for body in [arbiter.body1.index, arbiter.body2.index] {
+                if !self.of_body(body).any(|index| index == arbiter.id.index) {
+                    return Err(format!("{:?} is missing from the list of body {body}", arbiter.id));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Appends an entry unless it is there already: an arbiter that slept and woke since the last merge stands in both lists.
+fn push_unique(list: &mut Vec<(ArbiterKey, u32)>, entry: (ArbiterKey, u32)) {
+    if list.last() != Some(&entry) {
+        list.push(entry);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn body(index: u32) -> BodyId {
+        BodyId { index, generation: 0 }
+    }
+
+    #[test]
+    fn the_solving_order_follows_the_keys_whatever_the_history() {
+        let mut store = ArbiterStore::default();
+        let c = store.create(ArbiterKey::new(3, 1), body(1), body(2));
+        let a = store.create(ArbiterKey::new(1, 2), body(1), body(3));
+        assert_eq!(store.awake_by_key().iter().map(|e| e.1).collect::<Vec<_>>(), [a, c]);
+        store.remove(c);
+        let b = store.create(ArbiterKey::new(1, 3), body(2), body(3));
+        assert_eq!(b, c, "the place is reused");
+        store.set_awake(a, false);
+        store.set_awake(a, true);
+        assert_eq!(store.awake_by_key().iter().map(|e| e.1).collect::<Vec<_>>(), [a, b]);
+        store.validate().unwrap();
+    }
+
+    #[test]
+    fn lists_of_bodies_survive_removal_in_any_order() {
+        let mut store = ArbiterStore::default();
+        let all: Vec<u32> = (0..6).map(|i| store.create(ArbiterKey::new(0, i), body(0), body(1 + i as u32))).collect();
+        for index in [all[2], all[0], all[5]] {
+            store.remove(index);
+            store.validate().unwrap();
+        }
+        assert_eq!(store.of_body(0).count(), 3);
+    }
+}

@@ -1,0 +1,102 @@
+//! Islands: bodies tied together by contacts, which sleep and wake as one.
+//!
+//! Nothing is kept while bodies are awake. When some body has rested long enough, the awake bodies are joined along their
+//! contacts by union-find; islands all of whose bodies have rested go to sleep. A sleeping island is a list of bodies, kept
+//! until one of them is woken. Worlds that are busy everywhere pay nothing, worlds at rest pay once.
+//!
+//! Roots are always the smallest member, so the result depends on the contacts and not on their order.
+
+/// Finds islands among the bodies of one step.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct IslandFinder {
+    /// Parent of each body, by slot; meaningful for the bodies last reset.
+    parents: Vec<u32>,
+}
+
+impl IslandFinder {
+    /// Starts with each of `bodies` alone.
+    pub fn reset(&mut self, slots: usize, bodies: impl Iterator<Item = u32>) {
+        self.parents.resize(slots, 0);
+        for body in bodies {
+            self.parents[body as usize] = body;
+        }
+    }
+
+    /// The smallest body of the island, shortening the path on the way.
+    pub fn root(&mut self, mut body: u32) -> u32 {
+        loop {
+            let parent = self.parents[body as usize];
+            if parent == body {
+                return body;
+            }
+            let grandparent = self.parents[parent as usize];
+            self.parents[body as usize] = grandparent;
+            body = grandparent;
+        }
+    }
+
+    /// Ties two bodies.
+    pub fn join(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.root(a), self.root(b));
+        let (low, high) = (a.min(b), a.max(b));
+        self.parents[high as usize] = low;
+    }
+}
+
+/// Sleeping islands, each a list of bodies.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct SleepingIslands {
+    islands: Vec<Vec<u32>>,
+    free: Vec<u32>,
+}
+
+impl SleepingIslands {
+    /// Makes an island and returns its number.
+    pub fn add(&mut self, bodies: &[u32]) -> u32 {
+        let number = self.free.pop().unwrap_or_else(|| {
+            self.islands.push(Vec::new());
+            (self.islands.len() - 1) as u32
+        });
+        self.islands[number as usize].extend_from_slice(bodies);
+        number
+    }
+
+    /// Ends an island: its bodies are appended to `bodies`.
+    pub fn take(&mut self, number: u32, bodies: &mut Vec<u32>) {
+        bodies.append(&mut self.islands[number as usize]);
+        self.free.push(number);
+    }
+
+    /// Bodies of an island.
+    pub fn bodies(&self, number: u32) -> &[u32] {
+        &self.islands[number as usize]
+    }
+
+    /// Takes one body out of an island, which stays asleep.
+    pub fn remove_body(&mut self, number: u32, body: u32) {
+        let island = &mut self.islands[number as usize];
+        island.retain(|&other| other != body);
+        if island.is_empty() {
+            self.free.push(number);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn islands_are_named_after_their_smallest_body_in_any_order() {
+        let ties = [(4, 7), (1, 4), (2, 3), (7, 9)];
+        let mut roots = Vec::new();
+        for order in [[0, 1, 2, 3], [3, 2, 1, 0], [1, 3, 0, 2]] {
+            let mut finder = IslandFinder::default();
+            finder.reset(10, 0..10);
+            order.iter().for_each(|&i: &usize| finder.join(ties[i].0, ties[i].1));
+            roots.push((0..10).map(|body| finder.root(body)).collect::<Vec<_>>());
+        }
+        assert_eq!(roots[0], [0, 1, 2, 2, 1, 5, 6, 1, 8, 1]);
+        assert!(roots.iter().all(|r| *r == roots[0]));
+    }
+}

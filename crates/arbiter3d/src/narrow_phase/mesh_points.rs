@@ -1,0 +1,244 @@
+//! Which four of a mesh's many contact points carry the pair.
+//!
+//! Points are gathered from all triangles into a fixed buffer. They are grouped by normal; when the buffer is full, each
+//! group keeps its deepest point and its extremes along eight directions of its plane. That loses no corner of a box,
+//! however many triangles the box lies on: a corner of a right angle is extreme along at least one of eight directions.
+//!
+//! At the end the groups are merged, nearest normals first, until there are at most four. Every group gives its deepest
+//! point; the remaining places go where they add most: the square of a length for the second point of a group, twice
+//! the area for the third and the fourth. So a box on a floor keeps its four corners, a box in a groove two on each side.
+
+use crate::math::{Real, Vec3, tangents};
+
+/// The normal of a point is not that of a triangle.
+pub(super) const NO_FACET: u32 = u32::MAX;
+
+/// A contact point, in the frame of the convex shape.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Candidate {
+    /// On the mesh.
+    pub(super) position: Vec3,
+    /// From the mesh to the convex shape.
+    pub(super) normal: Vec3,
+    pub(super) separation: Real,
+    pub(super) feature: u32,
+    /// Internal number of the triangle whose normal this is (on either side of it), or [`NO_FACET`].
+    pub(super) facet: u32,
+}
+
+const CAPACITY: usize = 64;
+/// Groups kept when the buffer is full: six of nine points leave room for ten more.
+const MOST_GROUPS: usize = 6;
+/// Normals closer than this (one degree) become one, so that the solver treats the points as one patch.
+const SAME_NORMAL: Real = 0.99985;
+/// Cosines at which groups are tried: 8°, 25°, 60°, 90°, 120°, anything.
+const MERGE: [Real; 6] = [0.99, 0.9, 0.5, 0.0, -0.5, -2.0];
+/// Points less deep than the deepest by this share of the tolerance count as deepest: rounding, not rocking.
+const EQUALLY_DEEP: Real = 0.02;
+/// Another choice must be better by this share, so that rounding does not swap equal ones from step to step.
+const TIE: Real = 1.000_001;
+
+/// The points found so far.
+pub(super) struct Candidates {
+    list: [Candidate; CAPACITY],
+    count: usize,
+    /// Length below which points do not differ, metres.
+    tolerance: Real,
+    /// The least separation of all points.
+    deepest: Real,
+}
+
+/// Points by group.
+struct Groups {
+    of: [u8; CAPACITY],
+    normals: [Vec3; CAPACITY],
+    count: usize,
+}
+
+impl Candidates {
+    pub(super) fn new(tolerance: Real) -> Self {
+        let none = Candidate { position: Vec3::ZERO, normal: Vec3::ZERO, separation: 0.0, feature: 0, facet: NO_FACET };
+        Self { list: [none; CAPACITY], count: 0, tolerance, deepest: Real::MAX }
+    }
+
+    /// The least separation of all points that were added, also of those dropped since.
+    pub(super) fn deepest(&self) -> Real {
+        self.deepest
+    }
+
+    /// Adds a point. One that is not finite (shapes too large for single precision) is left out.
+    pub(super) fn push(&mut self, candidate: Candidate) {
+        if !(candidate.separation.is_finite() && candidate.position.is_finite() && candidate.normal.is_finite()) {
+            return;
+        }
+        if self.count == CAPACITY {
+            self.thin_out();
+        }
+        if candidate.separation < self.deepest {
+            self.deepest = candidate.separation;
+        }
+        self.list[self.count] = candidate;
+        self.count += 1;
+    }
+
+    /// Hands out the four points that matter most, or fewer.
+    pub(super) fn choose(&mut self, mut take: impl FnMut(&Candidate)) {
+        if self.count == 0 {
+            return;
+        }
+        self.unite_normals();
+        let groups = self.group(4);
+        let mut chosen = Chosen { points: [[0; 4]; 4], counts: [0; 4] };
+        for group in 0..groups.count {
+            chosen.add(group, self.deepest_of(&groups, group));
+        }
+        for _ in groups.count..4 {
+            let Some((group, index)) = self.most_useful(&groups, &chosen) else { break };
+            chosen.add(group, index);
+        }
+        for group in 0..groups.count {
+            for &index in &chosen.points[group][..chosen.counts[group]] {
+                take(&self.list[index]);
+            }
+        }
+    }
+
+    /// Gives points with almost the same normal the very same, that of a triangle if there is one among them.
+    fn unite_normals(&mut self) {
+        let first = self.list[0].normal;
+        if self.list[..self.count].iter().all(|c| c.normal == first) {
+            return;
+        }
+        let mut leaders = [0_u8; CAPACITY];
+        let mut count = 0;
+        for faces in [true, false] {
+            for i in 0..self.count {
+                let candidate = self.list[i];
+                if (candidate.facet != NO_FACET) != faces {
+                    continue;
+                }
+                let same = |&&leader: &&u8| self.list[leader as usize].normal.dot(candidate.normal) > SAME_NORMAL;
+                if let Some(&leader) = leaders[..count].iter().find(same) {
+                    let leader = self.list[leader as usize];
+                    self.list[i].normal = leader.normal;
+                    self.list[i].facet = leader.facet;
+                } else {
+                    leaders[count] = i as u8;
+                    count += 1;
+                }
+            }
+        }
+    }
+
+    /// Groups the points by normal into at most `limit` groups.
+    fn group(&self, limit: usize) -> Groups {
+        let mut groups = Groups { of: [0; CAPACITY], normals: [Vec3::ZERO; CAPACITY], count: 0 };
+        for cosine in MERGE {
+            groups.count = 0;
+            for (i, candidate) in self.list[..self.count].iter().enumerate() {
+                let known = groups.normals[..groups.count].iter().position(|n| n.dot(candidate.normal) > cosine);
+                let group = known.unwrap_or(groups.count);
+                if known.is_none() {
+                    groups.normals[group] = candidate.normal;
+                    groups.count += 1;
+                }
+                groups.of[i] = group as u8;
+            }
+            if groups.count <= limit {
+                break;
+            }
+        }
+        groups
+    }
+
+    fn members<'a>(&'a self, groups: &'a Groups, group: usize) -> impl Iterator<Item = (usize, &'a Candidate)> {
+        let all = self.list[..self.count].iter().enumerate();
+        all.filter(move |(i, _)| groups.of[*i] as usize == group)
+    }
+
+    /// The deepest point of a group. Of several that are equally deep, an outermost one: a corner of the contact patch
+    /// rather than a point inside it, and the same one in every step.
+    fn deepest_of(&self, groups: &Groups, group: usize) -> usize {
+        let least = self.members(groups, group).fold(Real::MAX, |m, (_, c)| crate::math::min(m, c.separation));
+        let (t1, t2) = tangents(groups.normals[group]);
+        let outwards = t1 + t2 * 0.618;
+        let mut best = (0, -Real::MAX);
+        for (i, candidate) in self.members(groups, group) {
+            let reach = candidate.position.dot(outwards);
+            if candidate.separation <= least + EQUALLY_DEEP * self.tolerance && reach > best.1 {
+                best = (i, reach);
+            }
+        }
+        best.0
+    }
+
+    /// The point that adds most to its group.
+    fn most_useful(&self, groups: &Groups, chosen: &Chosen) -> Option<(usize, usize)> {
+        let mut best = None;
+        let mut most = self.tolerance * self.tolerance;
+        for (i, candidate) in self.list[..self.count].iter().enumerate() {
+            let group = groups.of[i] as usize;
+            let corners = chosen.points[group].map(|j| self.list[j].position);
+            let gain = gain(&corners[..chosen.counts[group]], candidate.position, groups.normals[group]);
+            if gain > most * TIE {
+                most = gain;
+                best = Some((group, i));
+            }
+        }
+        best
+    }
+
+    /// Makes room: keeps the deepest point of each group and its extremes along eight directions.
+    fn thin_out(&mut self) {
+        const DIAGONAL: Real = std::f32::consts::FRAC_1_SQRT_2;
+        let groups = self.group(MOST_GROUPS);
+        let mut keep = [false; CAPACITY];
+        for group in 0..groups.count {
+            let (t1, t2) = tangents(groups.normals[group]);
+            let (d1, d2) = ((t1 + t2) * DIAGONAL, (t1 - t2) * DIAGONAL);
+            keep[self.deepest_of(&groups, group)] = true;
+            for direction in [t1, -t1, t2, -t2, d1, -d1, d2, -d2] {
+                let mut best = (0, -Real::MAX);
+                for (i, candidate) in self.members(&groups, group) {
+                    let reach = candidate.position.dot(direction);
+                    if reach > best.1 {
+                        best = (i, reach);
+                    }
+                }
+                keep[best.0] = true;
+            }
+        }
+        let mut count = 0;
+        for (i, _) in keep.iter().enumerate().filter(|(_, kept)| **kept) {
+            self.list[count] = self.list[i];
+            count += 1;
+        }
+        self.count = count;
+    }
+}
+
+struct Chosen {
+    points: [[usize; 4]; 4],
+    counts: [usize; 4],
+}
+
+impl Chosen {
+    fn add(&mut self, group: usize, index: usize) {
+        self.points[group][self.counts[group]] = index;
+        self.counts[group] += 1;
+    }
+}
+
+/// What a point adds to those of its group: square of the distance, twice the area of the triangle, twice the area outside it.
+fn gain(corners: &[Vec3], point: Vec3, normal: Vec3) -> Real {
+    match *corners {
+        [a] => (point - a).length_squared(),
+        [a, b] => normal.dot((b - a).cross(point - a)).abs(),
+        [a, b, c] => {
+            let turn = if normal.dot((b - a).cross(c - a)) < 0.0 { -1.0 } else { 1.0 };
+            let outside = |p: Vec3, q: Vec3| -turn * normal.dot((q - p).cross(point - p));
+            crate::math::max(crate::math::max(outside(a, b), outside(b, c)), outside(c, a))
+        }
+        _ => 0.0,
+    }
+}

@@ -1,0 +1,201 @@
+//! One view of cuboids and hulls for the kernels that work on faces, edges and corners.
+//!
+//! A cuboid has the topology of a hull that never changes; only its eight corners and six offsets are filled in.
+//! Corner `i` of a cuboid has `x > 0` if bit 0 of `i` is set, `y > 0` for bit 1, `z > 0` for bit 2. Face `2k` looks
+//! down axis `k`, face `2k + 1` up.
+
+use crate::math::{Real, Vec3, abs3, max};
+use crate::shape::{ConvexHull, Cuboid, HalfEdge, Plane};
+
+/// Corners of each face of a cuboid, counter-clockwise from outside.
+const LOOPS: [[u8; 4]; 6] = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+
+const TOPOLOGY: ([HalfEdge; 24], [u16; 6]) = topology();
+
+/// Numbers the half edges of a cuboid so that twins are neighbours.
+const fn topology() -> ([HalfEdge; 24], [u16; 6]) {
+    let mut edges = [HalfEdge { origin: 0, face: 0, next: 0 }; 24];
+    let mut face_edges = [0; 6];
+    // ids[f][k]: the half edge from corner k to corner k + 1 of face f.
+    let mut ids = [[0u16; 4]; 6];
+    let (mut f, mut count) = (0, 0);
+    while f < 6 {
+        let mut k = 0;
+        while k < 4 {
+            let (a, b) = (LOOPS[f][k], LOOPS[f][(k + 1) % 4]);
+            let twin = find(&ids, f, b, a);
+            ids[f][k] = if twin == u16::MAX { count } else { twin ^ 1 };
+            if twin == u16::MAX {
+                count += 2;
+            }
+            k += 1;
+        }
+        f += 1;
+    }
+    f = 0;
+    while f < 6 {
+        let mut k = 0;
+        while k < 4 {
+            edges[ids[f][k] as usize] = HalfEdge { origin: LOOPS[f][k], face: f as u16, next: ids[f][(k + 1) % 4] };
+            k += 1;
+        }
+        face_edges[f] = ids[f][0];
+        f += 1;
+    }
+    (edges, face_edges)
+}
+
+/// The half edge from `a` to `b` among the first `faces` faces.
+const fn find(ids: &[[u16; 4]; 6], faces: usize, a: u8, b: u8) -> u16 {
+    let mut f = 0;
+    while f < faces {
+        let mut k = 0;
+        while k < 4 {
+            if LOOPS[f][k] == a && LOOPS[f][(k + 1) % 4] == b {
+                return ids[f][k];
+            }
+            k += 1;
+        }
+        f += 1;
+    }
+    u16::MAX
+}
+
+/// The length that tolerances of a shape are relative to: half its thickness, but for a sheet, whose thickness would
+/// put them below the rounding of its other coordinates, a fiftieth of half its length.
+#[inline(always)]
+pub(crate) fn tolerance_size(half_thickness: Real, half_length: Real) -> Real {
+    max(half_thickness, 0.02 * half_length)
+}
+
+/// [`tolerance_size`] of a cuboid.
+#[inline(always)]
+pub(crate) fn cuboid_size(half_extents: Vec3) -> Real {
+    tolerance_size(half_extents.min_element(), half_extents.max_element())
+}
+
+/// The corners and planes of a cuboid.
+pub(crate) struct CuboidFeatures {
+    vertices: [Vec3; 8],
+    planes: [Plane; 6],
+    inner_radius: Real,
+    size: Real,
+}
+
+impl CuboidFeatures {
+    pub(crate) fn new(cuboid: &Cuboid) -> Self {
+        let h = cuboid.half_extents();
+        let sign = |i: usize, bit: usize, x: Real| if i >> bit & 1 == 1 { x } else { -x };
+        let plane = |normal: Vec3| Plane { normal, offset: abs3(normal).dot(h) };
+        Self {
+            vertices: std::array::from_fn(|i| Vec3::new(sign(i, 0, h.x), sign(i, 1, h.y), sign(i, 2, h.z))),
+            planes: [-Vec3::X, Vec3::X, -Vec3::Y, Vec3::Y, -Vec3::Z, Vec3::Z].map(plane),
+            inner_radius: h.min_element(),
+            size: cuboid_size(h),
+        }
+    }
+
+    pub(crate) fn view(&self) -> Polyhedron<'_> {
+        Polyhedron {
+            vertices: &self.vertices,
+            planes: &self.planes,
+            face_edges: &TOPOLOGY.1,
+            edges: &TOPOLOGY.0,
+            center: Vec3::ZERO,
+            inner_radius: self.inner_radius,
+            size: self.size,
+        }
+    }
+}
+
+/// Faces, edges and corners of a convex solid, in its own frame.
+#[derive(Clone, Copy)]
+pub(crate) struct Polyhedron<'a> {
+    pub vertices: &'a [Vec3],
+    pub planes: &'a [Plane],
+    pub face_edges: &'a [u16],
+    pub edges: &'a [HalfEdge],
+    /// A point inside.
+    pub center: Vec3,
+    /// Radius of a ball about `center` that fits inside.
+    pub inner_radius: Real,
+    /// The length that tolerances are relative to: see [`tolerance_size`].
+    pub size: Real,
+}
+
+impl<'a> Polyhedron<'a> {
+    pub(crate) fn from_hull(hull: &'a ConvexHull) -> Self {
+        Self {
+            vertices: hull.vertices(),
+            planes: hull.planes(),
+            face_edges: hull.face_edges(),
+            edges: hull.edges(),
+            center: hull.mass_properties(1.0).center,
+            inner_radius: hull.inner_radius(),
+            size: tolerance_size(hull.inner_radius(), hull.local_aabb().half_extents().max_element()),
+        }
+    }
+
+    /// Start and end of a half edge.
+    #[inline(always)]
+    pub(crate) fn edge_points(&self, edge: usize) -> (Vec3, Vec3) {
+        let e = self.edges[edge];
+        (self.vertices[e.origin as usize], self.vertices[self.edges[edge ^ 1].origin as usize])
+    }
+
+    /// The half edges around a face, counter-clockwise from outside.
+    pub(crate) fn face_loop(&self, face: usize) -> impl Iterator<Item = usize> + use<'a> {
+        let (edges, first) = (self.edges, self.face_edges[face] as usize);
+        let mut next = Some(first);
+        std::iter::from_fn(move || {
+            let edge = next?;
+            let following = edges[edge].next as usize;
+            next = (following != first).then_some(following);
+            Some(edge)
+        })
+    }
+
+    /// The plane through an edge of `face`, square to the face, looking out of it: `(normal, offset)` of unit length.
+    #[inline]
+    pub(crate) fn side_plane(&self, edge: usize, face_normal: Vec3) -> (Vec3, Real) {
+        let (a, b) = self.edge_points(edge);
+        let out = (b - a).cross(face_normal);
+        let out = out * (1.0 / out.length());
+        (out, out.dot(a))
+    }
+
+    /// The face whose normal is closest to `direction`.
+    pub(crate) fn face_along(&self, direction: Vec3) -> usize {
+        let (mut best, mut cosine) = (0, -Real::MAX);
+        for (i, plane) in self.planes.iter().enumerate() {
+            let c = plane.normal.dot(direction);
+            if c > cosine {
+                (best, cosine) = (i, c);
+            }
+        }
+        best
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_topology_of_a_cuboid_is_closed_and_its_faces_wind_outwards() {
+        let features = CuboidFeatures::new(&Cuboid::new(Vec3::new(1.0, 2.0, 3.0)).unwrap());
+        let view = features.view();
+        for (face, plane) in view.planes.iter().enumerate() {
+            let edges: Vec<usize> = view.face_loop(face).collect();
+            assert_eq!(edges.len(), 4);
+            for edge in edges {
+                assert_eq!(view.edges[edge].face as usize, face);
+                let (a, b) = view.edge_points(edge);
+                assert_eq!((b, a), view.edge_points(edge ^ 1));
+                assert_eq!(plane.normal.dot(a), plane.offset);
+                let (out, offset) = view.side_plane(edge, plane.normal);
+                assert!(out.dot(plane.normal * plane.offset) < offset);
+            }
+        }
+    }
+}

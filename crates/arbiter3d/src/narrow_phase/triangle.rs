@@ -1,0 +1,451 @@
+//! One triangle of a mesh against a sphere or a capsule, and the normals that a triangle may push along.
+//!
+//! All is in the frame of the convex shape, whose centre is near the origin: large meshes lose no precision.
+//!
+//! A triangle may push along its face normal where the shape is above its face; along other normals only from an edge or a
+//! corner where the whole surface has a summit in that direction (see `mesh_edges`). A sphere on a seam therefore touches
+//! the face beside it, with the plane's own distance, and never the edge: seams inside a surface are not felt.
+
+use super::mesh_points::{Candidate, Candidates, NO_FACET};
+use crate::math::{Aabb, Mat3, Real, Vec3, abs3, clamp, max, max3, min, min3};
+use crate::shape::{Capsule, Facet, Sphere, TriangleMesh};
+
+/// Sine by which a normal may leave the range that an edge or a corner allows: rounding, not geometry.
+const ALLOWED_SINE: Real = 2e-3;
+/// A sphere counts as above a face up to this sine beyond its edges: seams flatter than that have no normals of their own.
+const SEAM_SINE: Real = 2e-3;
+
+/// Corners visited at most to learn whether a surface goes on.
+const MOST_CLIMBS: usize = 256;
+
+/// Where the convex shape is.
+pub(super) struct Frame {
+    /// From the shape's frame to the mesh's.
+    pub(super) rotation: Mat3,
+    /// From the mesh's frame to the shape's.
+    pub(super) inverse: Mat3,
+    pub(super) position: Vec3,
+    /// As in [`Reach`].
+    pub(super) scale: Real,
+}
+
+/// How close is close.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Reach {
+    /// Gaps up to this give points, metres.
+    pub(super) margin: Real,
+    /// Length that tolerances are relative to: the margin, but no more than the shape's inner radius.
+    pub(super) scale: Real,
+    /// Only overlaps give points: the second look at triangles that were left out (see `mesh`).
+    pub(super) second_look: bool,
+}
+
+/// A triangle in the frame of the convex shape.
+pub(super) struct Triangle<'a> {
+    pub(super) mesh: &'a TriangleMesh,
+    pub(super) frame: &'a Frame,
+    pub(super) facet: &'a Facet,
+    pub(super) index: u32,
+    pub(super) corners: [Vec3; 3],
+    /// Unit normal on the side of the shape's centre.
+    pub(super) normal: Vec3,
+    /// Of the plane: `normal · x = offset`. Computed in the mesh's axes, where a large triangle's corners are not rounded
+    /// by turning them.
+    offset: Real,
+    /// Unit vectors in the plane from each edge inwards.
+    pub(super) inward: [Vec3; 3],
+    /// How far the edges are let out, so that a point exactly on a seam belongs to both triangles.
+    pub(super) slack: Real,
+}
+
+impl<'a> Triangle<'a> {
+    /// The triangle as seen from its front (`side` 1) or back (−1); `None` if it is outside the box, which is in the
+    /// frame of the shape.
+    pub(super) fn new(
+        mesh: &'a TriangleMesh,
+        frame: &'a Frame,
+        index: usize,
+        side: Real,
+        bounds: &Aabb,
+    ) -> Option<Self> {
+        let facet = mesh.facet(index);
+        let corners = facet.corners.map(|c| frame.inverse * (c - frame.position));
+        let (low, high) =
+            (min3(corners[0], min3(corners[1], corners[2])), max3(corners[0], max3(corners[1], corners[2])));
+        if !bounds.overlaps(&Aabb::new(low, high)) {
+            return None;
+        }
+        let front = frame.inverse * facet.normal;
+        let extent = max3(abs3(low), abs3(high));
+        let size = max(extent.x, max(extent.y, extent.z));
+        Some(Self {
+            mesh,
+            frame,
+            facet,
+            index: index as u32,
+            corners,
+            normal: front * side,
+            offset: facet.normal.dot(facet.corners[0] - frame.position) * side,
+            inward: facet.inward.map(|u| frame.inverse * u),
+            slack: 1e-3 * frame.scale + 2e-7 * size,
+        })
+    }
+
+    /// Height of a point above the plane.
+    #[inline(always)]
+    pub(super) fn height(&self, point: Vec3) -> Real {
+        self.normal.dot(point) - self.offset
+    }
+
+    /// Ends of edge `i`.
+    #[inline(always)]
+    pub(super) fn edge(&self, i: usize) -> (Vec3, Vec3) {
+        (self.corners[i], self.corners[(i + 1) % 3])
+    }
+
+    /// Whether the surface goes on flat across an edge that cut something off: the neighbour has the rest, so where it
+    /// was cut is no end of the contact.
+    #[inline(always)]
+    pub(super) fn is_seam(&self, cut: u32) -> bool {
+        self.facet.flat_edges >> cut & 1 == 1
+    }
+
+    /// Whether no edge and no corner can touch, only the face.
+    #[inline(always)]
+    pub(super) fn is_plain(&self) -> bool {
+        self.facet.sharp_edges | self.facet.sharp_corners == 0
+    }
+
+    #[inline(always)]
+    pub(super) fn edge_is_sharp(&self, i: usize) -> bool {
+        self.facet.sharp_edges >> i & 1 == 1
+    }
+
+    /// Whether the surface has a summit along `normal` at edge `i`, for a normal at a right angle to the edge.
+    pub(super) fn edge_allows(&self, i: usize, normal: Vec3) -> bool {
+        let across = self.frame.inverse * self.mesh.neighborhood(self.index as usize).inward[i];
+        self.edge_is_sharp(i)
+            && self.inward[i].dot(normal) <= ALLOWED_SINE
+            && across.dot(normal) <= ALLOWED_SINE
+            && self.normal.dot(normal) >= -ALLOWED_SINE
+    }
+
+    /// Whether the surface has a summit along `normal` at corner `i`.
+    pub(super) fn corner_allows(&self, i: usize, normal: Vec3) -> bool {
+        if self.facet.sharp_corners >> i & 1 == 0 || self.normal.dot(normal) < -ALLOWED_SINE {
+            return false;
+        }
+        let normal = self.frame.rotation * normal;
+        let corner = self.facet.corners[i];
+        let mut ends = self.mesh.corner_ends(self.mesh.neighborhood(self.index as usize).corners[i]);
+        ends.all(|(end, _)| {
+            let along = end - corner;
+            along.dot(normal) <= ALLOWED_SINE * along.length()
+        })
+    }
+
+    /// Whether the surface goes on from corner `i` by `distance` along `normal` before it has fallen by `fall` under the
+    /// plane of this triangle: steepest climb from corner to corner.
+    pub(super) fn goes_on(&self, i: usize, normal: Vec3, distance: Real, fall: Real) -> bool {
+        let (along, up) = (self.frame.rotation * normal, self.frame.rotation * self.normal);
+        let start = self.facet.corners[i];
+        let mut corner = self.mesh.neighborhood(self.index as usize).corners[i];
+        let mut reached = 0.0;
+        for _ in 0..MOST_CLIMBS {
+            let mut next = None;
+            for (end, number) in self.mesh.corner_ends(corner) {
+                let step = end - start;
+                if step.dot(along) > reached && step.dot(up) >= -fall {
+                    (reached, next) = (step.dot(along), Some(number));
+                }
+            }
+            let Some(number) = next else { return false };
+            if reached >= distance {
+                return true;
+            }
+            corner = number;
+        }
+        // So finely cut that it went on for hundreds of edges: it is no rim.
+        true
+    }
+
+    /// How far inside each of its three sides a point is.
+    #[inline(always)]
+    pub(super) fn insides(&self, point: Vec3) -> [Real; 3] {
+        [0, 1, 2].map(|i| self.inward[i].dot(point - self.corners[i]) + self.slack)
+    }
+
+    /// The part of a segment above the face, given how far inside the sides its ends are: two numbers in `[0, 1]`, and
+    /// which sides cut it off (3 for none); `None` if no part is.
+    #[inline(always)]
+    pub(super) fn clip(start: &[Real; 3], end: &[Real; 3]) -> Option<([Real; 2], [u32; 2])> {
+        let (mut ends, mut cuts) = ([0.0, 1.0], [3, 3]);
+        for (i, (&da, &db)) in start.iter().zip(end).enumerate() {
+            if da < 0.0 && db < 0.0 {
+                return None;
+            }
+            if da < 0.0 && da / (da - db) > ends[0] {
+                (ends[0], cuts[0]) = (da / (da - db), i as u32);
+            } else if db < 0.0 && da / (da - db) < ends[1] {
+                (ends[1], cuts[1]) = (da / (da - db), i as u32);
+            }
+        }
+        (ends[0] <= ends[1]).then_some((ends, cuts))
+    }
+
+    /// A point below `above` on the plane, pushed along the face normal.
+    pub(super) fn face_candidate(&self, above: Vec3, height: Real, radius: Real, feature: u32) -> Candidate {
+        Candidate {
+            position: above - self.normal * height,
+            normal: self.normal,
+            separation: height - radius,
+            feature: feature_id(self.facet.patch, feature),
+            facet: self.index,
+        }
+    }
+
+    /// A point on an edge or a corner.
+    pub(super) fn rim_candidate(&self, position: Vec3, normal: Vec3, separation: Real, feature: u32) -> Candidate {
+        let feature = feature_id(self.facet.id, feature);
+        Candidate { position, normal, separation, feature, facet: NO_FACET }
+    }
+}
+
+/// One number for a triangle (or patch) and what touches it.
+pub(super) fn feature_id(triangle: u32, feature: u32) -> u32 {
+    let mixed = (triangle ^ 0x5bd1_e995).wrapping_mul(0x9e37_79b1).rotate_left(15) ^ feature.wrapping_mul(0x85eb_ca6b);
+    (mixed ^ mixed >> 15).wrapping_mul(0x2c1b_3c6d)
+}
+
+/// A convex shape that can be held against triangles one by one.
+pub(super) trait Solid {
+    /// A point inside, in the shape's frame.
+    fn center(&self) -> Vec3;
+    /// Radius of a ball about the centre inside the shape.
+    fn inner_radius(&self) -> Real;
+    /// Radius of a ball about the centre around the shape.
+    fn outer_radius(&self) -> Real;
+    /// The box around the shape in its frame.
+    fn bounds(&self) -> Aabb;
+    /// Adds the points of one triangle. Returns whether the triangle might overlap the shape but gave no point, because it
+    /// is the neighbours' matter: if they give none either, it is looked at again.
+    fn touch(&mut self, triangle: &Triangle, reach: &Reach, out: &mut Candidates) -> bool;
+}
+
+impl Solid for Sphere {
+    fn center(&self) -> Vec3 {
+        Vec3::ZERO
+    }
+
+    fn inner_radius(&self) -> Real {
+        self.radius()
+    }
+
+    fn outer_radius(&self) -> Real {
+        self.radius()
+    }
+
+    fn bounds(&self) -> Aabb {
+        self.local_aabb()
+    }
+
+    /// The face if the centre is above it, else the nearest edge or corner if that is a summit.
+    fn touch(&mut self, triangle: &Triangle, reach: &Reach, out: &mut Candidates) -> bool {
+        let height = triangle.height(Vec3::ZERO);
+        if height - self.radius() > reach.margin {
+            return false;
+        }
+        let slack = SEAM_SINE * height.abs() + triangle.slack;
+        let inside = |i: usize| triangle.inward[i].dot(triangle.corners[i]) <= slack;
+        if inside(0) && inside(1) && inside(2) {
+            out.push(triangle.face_candidate(Vec3::ZERO, height, self.radius(), 0));
+            return false;
+        }
+        if triangle.is_plain() && !reach.second_look {
+            return height < self.radius();
+        }
+        let mut nearest = (Real::MAX, 0, 0.0, Vec3::ZERO);
+        for i in 0..3 {
+            let (a, b) = triangle.edge(i);
+            let edge = b - a;
+            let t = clamp(-a.dot(edge) / edge.length_squared(), 0.0, 1.0);
+            let point = a + edge * t;
+            if point.length_squared() < nearest.0 {
+                nearest = (point.length_squared(), i, t, point);
+            }
+        }
+        let (squared, i, t, point) = nearest;
+        let distance = squared.sqrt();
+        if distance - self.radius() > reach.margin || distance < 1e-6 * self.radius() {
+            return distance < self.radius();
+        }
+        let normal = point * (-1.0 / distance);
+        if rim_allows(triangle, i, t, normal) {
+            out.push(triangle.rim_candidate(point, normal, distance - self.radius(), i as u32));
+            return false;
+        }
+        // The neighbours have a nearer point. If rounding lost it between them, the face takes it.
+        if reach.second_look && distance < self.radius() {
+            out.push(triangle.face_candidate(point + triangle.normal * height, height, self.radius(), 0));
+        }
+        distance < self.radius()
+    }
+}
+
+/// Whether the point at `t` of edge `i` may push along `normal`.
+fn rim_allows(triangle: &Triangle, i: usize, t: Real, normal: Vec3) -> bool {
+    if t <= 0.0 {
+        triangle.corner_allows(i, normal)
+    } else if t >= 1.0 {
+        triangle.corner_allows((i + 1) % 3, normal)
+    } else {
+        triangle.edge_allows(i, normal)
+    }
+}
+
+impl Solid for Capsule {
+    fn center(&self) -> Vec3 {
+        Vec3::ZERO
+    }
+
+    fn inner_radius(&self) -> Real {
+        self.radius()
+    }
+
+    fn outer_radius(&self) -> Real {
+        self.radius() + self.half_length()
+    }
+
+    fn bounds(&self) -> Aabb {
+        self.local_aabb()
+    }
+
+    /// The ends of the part of the segment above the face, and the nearest points of the edges that are summits there.
+    fn touch(&mut self, triangle: &Triangle, reach: &Reach, out: &mut Candidates) -> bool {
+        let end = Vec3::new(0.0, self.half_length(), 0.0);
+        let (low, high) = (triangle.height(-end), triangle.height(end));
+        let lowest = min(low, high);
+        if lowest - self.radius() > reach.margin {
+            return false;
+        }
+        let mut missing = lowest < self.radius();
+        if let Some((ends, cuts)) = Triangle::clip(&triangle.insides(-end), &triangle.insides(end)) {
+            let heights = ends.map(|t| low + (high - low) * t);
+            // A segment that runs under the triangle without crossing it counts only while the capsule still reaches up
+            // through the plane.
+            let crosses = max(heights[0], heights[1]) >= -self.radius();
+            let count = if ends[1] - ends[0] > 1e-6 { 2 } else { 1 };
+            for k in 0..count {
+                if crosses
+                    && heights[k] - self.radius() <= reach.margin
+                    && (reach.second_look || !triangle.is_seam(cuts[k]))
+                {
+                    let cut = 2 + (triangle.facet.id << 3 | cuts[k] << 1 | k as u32);
+                    let feature = if cuts[k] == 3 { k as u32 } else { cut };
+                    let point = end * (2.0 * ends[k] - 1.0);
+                    out.push(triangle.face_candidate(point, heights[k], self.radius(), feature));
+                    missing = false;
+                }
+            }
+        }
+        for i in 0..3 {
+            if triangle.facet.sharp_edges >> i & 1 == 1 || triangle.facet.sharp_corners >> i & 1 == 1 {
+                missing &= !self.touch_edge(triangle, i, reach, out);
+            }
+        }
+        if missing && reach.second_look {
+            self.touch_anyway(triangle, out);
+        }
+        missing
+    }
+}
+
+impl Capsule {
+    /// The overlap that no face and no summit explains, as a push along the face.
+    fn touch_anyway(&self, triangle: &Triangle, out: &mut Candidates) {
+        let end = Vec3::new(0.0, self.half_length(), 0.0);
+        for i in 0..3 {
+            let pair = SegmentPair::nearest(triangle.edge(i), (-end, end));
+            if (pair.on_second - pair.on_first).length() < self.radius() {
+                let height = triangle.height(pair.on_second);
+                let above = pair.on_first + triangle.normal * height;
+                out.push(triangle.face_candidate(above, height, self.radius(), 8 + i as u32));
+            }
+        }
+    }
+
+    /// The point or two nearest to edge `i`; whether there are any.
+    fn touch_edge(&self, triangle: &Triangle, i: usize, reach: &Reach, out: &mut Candidates) -> bool {
+        let (a, b) = triangle.edge(i);
+        let end = Vec3::new(0.0, self.half_length(), 0.0);
+        let pair = SegmentPair::nearest((a, b), (-end, end));
+        let gap = pair.on_second - pair.on_first;
+        let distance = gap.length();
+        if distance - self.radius() > reach.margin || distance < 1e-6 * self.radius() {
+            return false;
+        }
+        let normal = gap * (1.0 / distance);
+        if !rim_allows(triangle, i, pair.t, normal) {
+            return false;
+        }
+        let feature = 64 + 8 * i as u32;
+        if let Some(ends) = parallel_part((a, b), (-end, end)) {
+            for (k, (on_edge, on_axis)) in ends.into_iter().enumerate() {
+                let separation = normal.dot(on_axis - on_edge) - self.radius();
+                if separation <= reach.margin {
+                    out.push(triangle.rim_candidate(on_edge, normal, separation, feature + 1 + k as u32));
+                }
+            }
+        } else {
+            out.push(triangle.rim_candidate(pair.on_first, normal, distance - self.radius(), feature));
+        }
+        true
+    }
+}
+
+/// The nearest points of two segments.
+pub(super) struct SegmentPair {
+    pub(super) on_first: Vec3,
+    pub(super) on_second: Vec3,
+    /// Position on the first segment, 0 to 1.
+    pub(super) t: Real,
+}
+
+impl SegmentPair {
+    /// Source: Ericson, "Real-Time Collision Detection", 2005, section 5.1.9.
+    pub(super) fn nearest(first: (Vec3, Vec3), second: (Vec3, Vec3)) -> Self {
+        let (d1, d2, r) = (first.1 - first.0, second.1 - second.0, first.0 - second.0);
+        let (a, e, b) = (d1.length_squared(), d2.length_squared(), d1.dot(d2));
+        let (c, f) = (d1.dot(r), d2.dot(r));
+        let determinant = a * e - b * b;
+        // (Almost) parallel: any point of the first serves as a start, the clamping below finds its partner.
+        let mut t = if determinant > 1e-6 * a * e { clamp((b * f - c * e) / determinant, 0.0, 1.0) } else { 0.5 };
+        let mut s = (b * t + f) / e;
+        if !(0.0..=1.0).contains(&s) {
+            s = clamp(s, 0.0, 1.0);
+            t = clamp((b * s - c) / a, 0.0, 1.0);
+        }
+        Self { on_first: first.0 + d1 * t, on_second: second.0 + d2 * s, t }
+    }
+}
+
+/// The ends of the stretch along which two almost parallel segments run side by side, as points of the first and the
+/// second; `None` if they are not parallel (within 3°) or do not run side by side.
+pub(super) fn parallel_part(first: (Vec3, Vec3), second: (Vec3, Vec3)) -> Option<[(Vec3, Vec3); 2]> {
+    let (d1, d2) = (first.1 - first.0, second.1 - second.0);
+    let (a, b) = (d1.length_squared(), d1.dot(d2));
+    if d1.cross(d2).length_squared() > 0.0025 * a * d2.length_squared() {
+        return None;
+    }
+    let mut ts = [0.0, 1.0];
+    let (t0, t1) = (d1.dot(second.0 - first.0) / a, d1.dot(second.1 - first.0) / a);
+    let (low, high) = if t0 < t1 { (t0, t1) } else { (t1, t0) };
+    ts = [max(ts[0], low), min(ts[1], high)];
+    if ts[1] - ts[0] <= 1e-3 {
+        return None;
+    }
+    Some(ts.map(|t| {
+        let s = clamp((t - t0) * a / b, 0.0, 1.0);
+        (first.0 + d1 * t, second.0 + d2 * s)
+    }))
+}

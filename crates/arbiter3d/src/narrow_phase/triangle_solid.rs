@@ -1,0 +1,419 @@
+//! One triangle of a mesh against a cuboid or a convex hull.
+//!
+//! Separating axes: the face of the triangle, the faces of the solid, and pairs of edges. For a pair of edges the axis is
+//! not taken from their cross product: where the two faces at an edge of the solid, with normals `a` and `b`, lie on either
+//! side of the direction `e` of the triangle's edge, the outward normal of that edge square to `e` is `m = a |b·e| + b |a·e|`,
+//! and `−m` separates the two if it looks out of the triangle. Source of the arc test: Gregorius, "The Separating Axis
+//! Test between Convex Polyhedra", 2013.
+//!
+//! The axis of least overlap decides who deals with the contact. The face of the triangle: the solid's lowest face is
+//! clipped to the prism over the triangle. Another axis: if the surface has a summit along it there (see `mesh_edges`),
+//! that edge or corner makes the contact. If not, a neighbour reaches further along the axis. Where the surface goes on so
+//! far that the way out along the face is shorter, the face pushes; else the axis leads over a rim, and the contact is the
+//! neighbour's. Triangles without sharp edges, which are most, skip all this while the overlap is shallow.
+
+use super::mesh_points::{Candidate, Candidates};
+use super::polyhedron::Polyhedron;
+use super::triangle::{Reach, Solid, Triangle, feature_id, parallel_part};
+use crate::math::{Aabb, Real, Vec3, clamp, max, min};
+
+/// An edge, or the face, of a triangle lies level with its highest corner below this sine.
+const LEVEL_SINE: Real = 0.02;
+
+/// Overlaps up to this share of the solid's inner radius are shallow: inside a smooth surface its face alone pushes. Deeper
+/// ones may come from the side (a box past the rim of a finely cut block), so all axes are tried.
+const SHALLOW: Real = 0.5;
+
+/// Axes that push through the triangle to its other side are no way out; those that lean back less tell at least that
+/// the contact is a neighbour's.
+const BACKWARD: Real = -0.7;
+
+/// A cuboid or a hull with the ball around it.
+pub(super) struct Solids<'a> {
+    features: Polyhedron<'a>,
+    bounds: Aabb,
+    outer_radius: Real,
+    underside: Underside,
+}
+
+/// What of the solid is lowest over a triangle; the same for all triangles that face the same way.
+#[derive(Clone, Copy, Default)]
+struct Underside {
+    normal: Vec3,
+    corner: usize,
+    /// The face at that corner that lies flattest.
+    face: usize,
+    /// A ball around that face.
+    center: Vec3,
+    radius: Real,
+}
+
+/// The axis of least overlap.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Axis {
+    Triangle,
+    Face { face: usize },
+    Edges { edge: usize, solid_edge: usize, normal: Vec3 },
+}
+
+impl<'a> Solids<'a> {
+    pub(super) fn new(features: Polyhedron<'a>) -> Self {
+        let squared = features.vertices.iter().fold(0.0, |m, v| max(m, (*v - features.center).length_squared()));
+        let bounds = Aabb::from_points(features.vertices.iter().copied());
+        Self { features, bounds, outer_radius: squared.sqrt(), underside: Underside::default() }
+    }
+}
+
+impl Solid for Solids<'_> {
+    fn center(&self) -> Vec3 {
+        self.features.center
+    }
+
+    fn inner_radius(&self) -> Real {
+        self.features.inner_radius
+    }
+
+    fn outer_radius(&self) -> Real {
+        self.outer_radius
+    }
+
+    fn bounds(&self) -> Aabb {
+        self.bounds
+    }
+
+    fn touch(&mut self, triangle: &Triangle, reach: &Reach, out: &mut Candidates) -> bool {
+        if self.underside.normal != triangle.normal {
+            self.underside = Underside::new(&self.features, triangle.normal);
+        }
+        let height = triangle.height(self.features.vertices[self.underside.corner]);
+        if height > reach.margin {
+            return false;
+        }
+        let pair = Pair { solid: &self.features, triangle, reach, underside: &self.underside, height };
+        let shallow = triangle.is_plain() && height >= -SHALLOW * self.features.inner_radius;
+        if (shallow || pair.stands_on_face(self.underside.corner)) && !reach.second_look {
+            return pair.touch_face(out) == 0 && height < 0.0;
+        }
+        let Some((axis, separation)) = pair.least_overlap() else { return false };
+        let points = match pair.resolve(axis) {
+            Some(Axis::Triangle) => pair.touch_face(out),
+            Some(Axis::Face { face }) => pair.touch_solid_face(face, out),
+            Some(Axis::Edges { edge, solid_edge, normal }) => pair.touch_edges(edge, solid_edge, normal, out),
+            None if separation < 0.0 && pair.is_hemmed_in(axis, separation) => pair.touch_face(out),
+            None => 0,
+        };
+        if points > 0 || separation >= 0.0 {
+            return false;
+        }
+        if reach.second_look && pair.touch_face(out) == 0 {
+            pair.touch_overlap(out);
+        }
+        true
+    }
+}
+
+impl Underside {
+    fn new(solid: &Polyhedron, normal: Vec3) -> Self {
+        let mut lowest = (0, Real::MAX);
+        for (i, vertex) in solid.vertices.iter().enumerate() {
+            let height = normal.dot(*vertex);
+            if height < lowest.1 {
+                lowest = (i, height);
+            }
+        }
+        let mut flattest = (0, Real::MAX);
+        for edge in solid.edges {
+            if edge.origin as usize == lowest.0 {
+                let cosine = solid.planes[edge.face as usize].normal.dot(normal);
+                if cosine < flattest.1 {
+                    flattest = (edge.face as usize, cosine);
+                }
+            }
+        }
+        let corners = || solid.face_loop(flattest.0).map(|edge| solid.edge_points(edge).0);
+        let center = Aabb::from_points(corners()).center();
+        let squared = corners().fold(0.0, |m, corner| max(m, (corner - center).length_squared()));
+        Self { normal, corner: lowest.0, face: flattest.0, center, radius: squared.sqrt() }
+    }
+}
+
+/// A solid over a triangle.
+struct Pair<'a> {
+    solid: &'a Polyhedron<'a>,
+    triangle: &'a Triangle<'a>,
+    reach: &'a Reach,
+    underside: &'a Underside,
+    /// Of the solid's lowest corner over the triangle's plane.
+    height: Real,
+}
+
+impl Pair<'_> {
+    /// Whether the lowest corner is over the triangle, farther from each edge than deep. Then no axis is better than the
+    /// face's: along one that leans by the angle θ the corner overlaps by at least `depth · (cos θ + sin θ)`.
+    fn stands_on_face(&self, corner: usize) -> bool {
+        let corner = self.solid.vertices[corner];
+        let triangle = self.triangle;
+        (0..3).all(|i| triangle.inward[i].dot(corner - triangle.corners[i]) >= self.height.abs())
+    }
+
+    /// The axis of least overlap and the separation along it; `None` if some axis shows a gap beyond the margin. The
+    /// triangle's face wins unless another axis is better by more than rounding and rocking can make it.
+    fn least_overlap(&self) -> Option<(Axis, Real)> {
+        let mut best = (Axis::Triangle, self.height);
+        let bias = 0.02 * self.reach.scale;
+        let mut offer = |axis: Axis, normal: Vec3, separation: Real| {
+            if separation > best.1 + bias && normal.dot(self.triangle.normal) > BACKWARD {
+                best = (axis, separation);
+            }
+            separation <= self.reach.margin
+        };
+        for (face, plane) in self.solid.planes.iter().enumerate() {
+            let [a, b, c] = self.triangle.corners.map(|corner| plane.normal.dot(corner) - plane.offset);
+            if !offer(Axis::Face { face }, -plane.normal, min(a, min(b, c))) {
+                return None;
+            }
+        }
+        for edge in 0..3 {
+            let (start, end) = self.triangle.edge(edge);
+            let along = end - start;
+            for solid_edge in (0..self.solid.edges.len()).step_by(2) {
+                let Some(normal) = self.edge_normal(edge, along, solid_edge) else { continue };
+                let origin = self.solid.vertices[self.solid.edges[solid_edge].origin as usize];
+                let separation = normal.dot(origin - start);
+                if !offer(Axis::Edges { edge, solid_edge, normal }, normal, separation) {
+                    return None;
+                }
+            }
+        }
+        Some(best)
+    }
+
+    /// The axis of a pair of edges, from the triangle to the solid; `None` if the two cannot be the nearest features.
+    #[inline]
+    fn edge_normal(&self, edge: usize, along: Vec3, solid_edge: usize) -> Option<Vec3> {
+        let a = self.solid.planes[self.solid.edges[solid_edge].face as usize].normal;
+        let b = self.solid.planes[self.solid.edges[solid_edge + 1].face as usize].normal;
+        let (da, db) = (a.dot(along), b.dot(along));
+        if da * db >= 0.0 {
+            return None;
+        }
+        let outward = a * db.abs() + b * da.abs();
+        let squared = outward.length_squared();
+        if outward.dot(self.triangle.inward[edge]) <= 0.0 || squared < 1e-12 * along.length_squared() {
+            return None;
+        }
+        Some(outward * (-1.0 / squared.sqrt()))
+    }
+
+    /// Whether the surface around the triangle goes on along an axis so far that the way out along the triangle's normal
+    /// is shorter after all. The surface may fall by half that way, no more: else the axis leads over its rim.
+    fn is_hemmed_in(&self, axis: Axis, separation: Real) -> bool {
+        let normal = match axis {
+            Axis::Triangle => return true,
+            Axis::Face { face } => -self.solid.planes[face].normal,
+            Axis::Edges { normal, .. } => normal,
+        };
+        self.triangle.goes_on(self.top(normal), normal, separation - self.height, -0.5 * self.height)
+    }
+
+    /// The corner of the triangle that is farthest along a direction.
+    fn top(&self, direction: Vec3) -> usize {
+        let [a, b, c] = self.triangle.corners.map(|corner| direction.dot(corner));
+        if a >= b && a >= c { 0 } else { 1 + usize::from(c > b) }
+    }
+
+    /// What the axis means for the surface: an axis across a level triangle is the triangle's own; one along which the
+    /// surface has no summit here is `None`.
+    fn resolve(&self, axis: Axis) -> Option<Axis> {
+        let triangle = self.triangle;
+        match axis {
+            Axis::Triangle => Some(axis),
+            Axis::Edges { edge, normal, .. } => triangle.edge_allows(edge, normal).then_some(axis),
+            Axis::Face { face } => {
+                let normal = -self.solid.planes[face].normal;
+                let rise = triangle.corners.map(|corner| normal.dot(corner));
+                let top = self.top(normal);
+                let level = |i: usize| {
+                    let length = (triangle.corners[i] - triangle.corners[top]).length();
+                    rise[top] - rise[i] <= LEVEL_SINE * length
+                };
+                let (next, last) = ((top + 1) % 3, (top + 2) % 3);
+                let allowed = match (level(next), level(last)) {
+                    (true, true) => return Some(Axis::Triangle),
+                    (true, false) => triangle.edge_allows(top, normal),
+                    (false, true) => triangle.edge_allows(last, normal),
+                    (false, false) => triangle.corner_allows(top, normal),
+                };
+                allowed.then_some(axis)
+            }
+        }
+    }
+
+    /// The solid's lowest face cut by the prism over the triangle, and the triangle's corners under that face.
+    fn touch_face(&self, out: &mut Candidates) -> usize {
+        let triangle = self.triangle;
+        let seams = !self.reach.second_look;
+        let mut points = 0;
+        let Underside { face, center, radius, .. } = *self.underside;
+        if triangle.insides(center).iter().any(|inside| *inside < -radius) {
+            return 0;
+        }
+        let first = self.solid.edge_points(self.solid.face_edges[face] as usize).0;
+        let mut end = triangle.insides(first);
+        // Corners amid a flat surface are no ends of the contact.
+        let mut under = [0, 1, 2].map(|i| !(seams && triangle.facet.flat_corners >> i & 1 == 1));
+        let any = under != [false; 3];
+        for edge in self.solid.face_loop(face) {
+            let (a, b) = self.solid.edge_points(edge);
+            // Looks into the face's prism: the face winds clockwise as seen from the triangle.
+            let inside = (b - a).cross(triangle.normal);
+            for (corner, under) in triangle.corners.iter().zip(&mut under).filter(|_| any) {
+                *under &= inside.dot(*corner - a) > 0.0;
+            }
+            let start = end;
+            end = triangle.insides(b);
+            let Some((ends, cuts)) = Triangle::clip(&start, &end) else { continue };
+            if cuts[0] == 3 {
+                points += self.face_point(a, u32::from(self.solid.edges[edge].origin), out);
+            }
+            for k in 0..2 {
+                // Where a seam cuts is no end of the contact.
+                if cuts[k] != 3 && !(seams && triangle.is_seam(cuts[k])) {
+                    points += self.face_point(a + (b - a) * ends[k], self.cut(edge, cuts[k], k as u32), out);
+                }
+            }
+        }
+        let plane = self.solid.planes[face];
+        let slope = plane.normal.dot(triangle.normal);
+        for (i, corner) in triangle.corners.iter().enumerate() {
+            if under[i] && slope < -0.01 {
+                let gap = (plane.offset - plane.normal.dot(*corner)) / slope;
+                let feature = 512 + (triangle.facet.id << 2 | i as u32);
+                points += self.face_point(*corner + triangle.normal * gap, feature, out);
+            }
+        }
+        points
+    }
+
+    /// Number of the point where side `cut` of this triangle's prism cuts an edge of the solid.
+    fn cut(&self, edge: usize, cut: u32, end: u32) -> u32 {
+        feature_id(self.triangle.facet.id, 1024 + (((edge as u32) << 3) | (cut << 1) | end))
+    }
+
+    /// A point of the solid over (or under) the triangle.
+    fn face_point(&self, point: Vec3, feature: u32, out: &mut Candidates) -> usize {
+        let height = self.triangle.height(point);
+        if height > self.reach.margin {
+            return 0;
+        }
+        out.push(self.triangle.face_candidate(point, height, 0.0, feature));
+        1
+    }
+
+    /// The triangle's edges cut by the prism over a face of the solid.
+    fn touch_solid_face(&self, face: usize, out: &mut Candidates) -> usize {
+        let plane = self.solid.planes[face];
+        let mut ends = [[0.0, 1.0]; 3];
+        for solid_edge in self.solid.face_loop(face) {
+            let (side, offset) = self.solid.side_plane(solid_edge, plane.normal);
+            let distance = self.triangle.corners.map(|corner| offset + self.triangle.slack - side.dot(corner));
+            for (i, ends) in ends.iter_mut().enumerate() {
+                let (da, db) = (distance[i], distance[(i + 1) % 3]);
+                if da < 0.0 && db < 0.0 {
+                    ends[0] = 2.0;
+                } else if da < 0.0 {
+                    ends[0] = max(ends[0], da / (da - db));
+                } else if db < 0.0 {
+                    ends[1] = min(ends[1], da / (da - db));
+                }
+            }
+        }
+        let mut points = 0;
+        for (i, ends) in ends.iter().enumerate() {
+            if ends[0] > ends[1] {
+                continue;
+            }
+            let (a, b) = self.triangle.edge(i);
+            for (k, t) in ends.iter().enumerate() {
+                let position = a + (b - a) * *t;
+                let separation = plane.normal.dot(position) - plane.offset;
+                if separation <= self.reach.margin && (k == 0 || *t < 1.0) {
+                    let feature = (face as u32) << 3 | (i as u32) << 1 | k as u32;
+                    out.push(self.triangle.rim_candidate(position, -plane.normal, separation, feature));
+                    points += 1;
+                }
+            }
+        }
+        points
+    }
+
+    /// Where two edges cross, or the ends of the stretch along which they run side by side.
+    fn touch_edges(&self, edge: usize, solid_edge: usize, normal: Vec3, out: &mut Candidates) -> usize {
+        let (first, second) = (self.triangle.edge(edge), self.solid.edge_points(solid_edge));
+        let feature = 4096 + ((solid_edge as u32) << 4 | (edge as u32) << 2);
+        if let Some(ends) = parallel_part(first, second) {
+            for (k, (on_edge, on_solid)) in ends.into_iter().enumerate() {
+                let separation = normal.dot(on_solid - on_edge);
+                out.push(self.triangle.rim_candidate(on_edge, normal, separation, feature + 1 + k as u32));
+            }
+            return 2;
+        }
+        let (d1, d2, r) = (first.1 - first.0, second.1 - second.0, first.0 - second.0);
+        let (a, e, b) = (d1.length_squared(), d2.length_squared(), d1.dot(d2));
+        let t = clamp((b * d2.dot(r) - d1.dot(r) * e) / (a * e - b * b), 0.0, 1.0);
+        let separation = normal.dot(second.0 - first.0);
+        out.push(self.triangle.rim_candidate(first.0 + d1 * t, normal, separation, feature));
+        1
+    }
+
+    /// The part of the triangle inside the solid, pushed out along the face normal: never nothing for a real overlap.
+    fn touch_overlap(&self, out: &mut Candidates) {
+        for i in 0..3 {
+            let (a, b) = self.triangle.edge(i);
+            let (mut enter, mut leave) = (0.0, 1.0);
+            for plane in self.solid.planes {
+                let da = plane.offset - plane.normal.dot(a);
+                let db = plane.offset - plane.normal.dot(b);
+                if da < 0.0 && db < 0.0 {
+                    leave = -1.0;
+                } else if da < 0.0 {
+                    enter = max(enter, da / (da - db));
+                } else if db < 0.0 {
+                    leave = min(leave, da / (da - db));
+                }
+            }
+            if enter <= leave {
+                self.push_out(a + (b - a) * enter, i as u32, out);
+                self.push_out(a + (b - a) * leave, 4 + i as u32, out);
+            }
+        }
+        for edge in (0..self.solid.edges.len()).step_by(2) {
+            let (a, b) = self.solid.edge_points(edge);
+            let (da, db) = (self.triangle.height(a), self.triangle.height(b));
+            if da * db < 0.0 {
+                let point = a + (b - a) * (da / (da - db));
+                if self.triangle.insides(point).iter().all(|inside| *inside >= 0.0) {
+                    self.push_out(point, 16 + edge as u32, out);
+                }
+            }
+        }
+    }
+
+    /// A point of the triangle inside the solid: the gap is how far the solid reaches below it.
+    fn push_out(&self, position: Vec3, feature: u32, out: &mut Candidates) {
+        let mut depth = Real::MAX;
+        for plane in self.solid.planes {
+            let sinking = -plane.normal.dot(self.triangle.normal);
+            if sinking > 1e-6 {
+                depth = min(depth, max(0.0, plane.offset - plane.normal.dot(position)) / sinking);
+            }
+        }
+        out.push(Candidate {
+            position,
+            normal: self.triangle.normal,
+            separation: -depth,
+            feature: feature_id(self.triangle.facet.id, feature),
+            facet: self.triangle.index,
+        });
+    }
+}

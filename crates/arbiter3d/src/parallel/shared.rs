@@ -1,0 +1,47 @@
+//! A slice that several threads write at different places.
+
+use std::marker::PhantomData;
+
+/// A mutable slice split by agreement: every thread touches only the elements that its block owns.
+pub(crate) struct SharedSlice<'a, T> {
+    start: *mut T,
+    len: usize,
+    borrow: PhantomData<&'a mut [T]>,
+}
+
+// SAFETY: elements are handed out one at a time under the contract of `get_mut`, so sharing the slice moves `T`s between
+// threads at most: `T: Send` is enough.
+unsafe impl<T: Send> Send for SharedSlice<'_, T> {}
+// SAFETY: as above.
+unsafe impl<T: Send> Sync for SharedSlice<'_, T> {}
+
+impl<'a, T> SharedSlice<'a, T> {
+    /// Shares a slice for as long as it is borrowed.
+    pub fn new(slice: &'a mut [T]) -> Self {
+        Self { start: slice.as_mut_ptr(), len: slice.len(), borrow: PhantomData }
+    }
+
+    /// One element.
+    ///
+    /// # Safety
+    /// No other thread may touch element `index` while the reference lives, and this thread may hold no other reference to it.
+    #[inline(always)]
+    #[expect(clippy::mut_from_ref, reason = "disjointness is the caller's promise")]
+    pub unsafe fn get_mut(&self, index: usize) -> &mut T {
+        assert!(index < self.len, "index {index} of a shared slice of {}", self.len);
+        // SAFETY: in bounds; unaliased by the caller's promise.
+        unsafe { &mut *self.start.add(index) }
+    }
+
+    /// A run of elements.
+    ///
+    /// # Safety
+    /// As [`SharedSlice::get_mut`], for every element of the run.
+    #[inline(always)]
+    #[expect(clippy::mut_from_ref, reason = "disjointness is the caller's promise")]
+    pub unsafe fn range_mut(&self, start: usize, end: usize) -> &mut [T] {
+        assert!(start <= end && end <= self.len, "run {start}..{end} of a shared slice of {}", self.len);
+        // SAFETY: in bounds; unaliased by the caller's promise.
+        unsafe { std::slice::from_raw_parts_mut(self.start.add(start), end - start) }
+    }
+}

@@ -1,0 +1,16 @@
+//! The solver: coloured wide rows, soft steps, integration. It knows arbiters and bodies' masses, not shapes.
+
+mod bodies;
+mod coloring;
+mod integrate;
+mod lanes;
+mod prepare;
+mod rows;
+mod solve;
+
+pub(crate) use bodies::{BodyMass, BodyMotion, BodyState, SolverBodies};
+pub(crate) use coloring::RowPlan;
+pub(crate) use integrate::{IntegrateParameters, integrate_position, integrate_velocity};
+pub(crate) use lanes::{ContactSolver, Pass, StoreTarget, contact_solver};
+pub(crate) use prepare::PrepareContext;
+pub(crate) use solve::{PassParameters, Softness};

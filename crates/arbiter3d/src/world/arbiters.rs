@@ -1,0 +1,280 @@
+//! Arbiters as the world's users see them: look up, make, feed, remove.
+
+use super::World;
+use super::error::{Error, finite_vec, unit_vec};
+use super::events::EndEvent;
+use super::id::BodyId;
+use crate::arbiter::{
+    Arbiter, ArbiterId, ArbiterKey, Contact, ContactPoint, EndReason, FRICTION_OVERRIDDEN, NONE,
+    RESTITUTION_OVERRIDDEN, ROLLING_OVERRIDDEN, SolveMode, TANGENT_VELOCITY_OVERRIDDEN,
+};
+use crate::math::{Vec3, max};
+use std::ops::Range;
+
+/// Ids that one call may reserve.
+const ID_RANGE_LIMIT: u64 = 1 << 48;
+
+impl World {
+    /// The arbiter with this key, if there is one.
+    #[must_use]
+    pub fn arbiter(&self, key: ArbiterKey) -> Option<&Arbiter> {
+        self.arbiters.find(key).map(|index| self.arbiters.at(index))
+    }
+
+    /// The arbiter with this id, if it lives.
+    #[must_use]
+    pub fn arbiter_by_id(&self, id: ArbiterId) -> Option<&Arbiter> {
+        self.arbiters.index_of(id).map(|index| self.arbiters.at(index))
+    }
+
+    /// The arbiter with this id, to change; `None` if it has ended.
+    pub fn arbiter_mut(&mut self, id: ArbiterId) -> Option<&mut Arbiter> {
+        self.arbiters.index_of(id).map(|index| self.arbiters.at_mut(index))
+    }
+
+    /// All arbiters, those of sleeping bodies included, in no particular order.
+    pub fn arbiters(&self) -> impl Iterator<Item = &Arbiter> {
+        self.arbiters.iter()
+    }
+
+    /// The arbiters of a body; none for an unknown one.
+    pub fn arbiters_of(&self, body: BodyId) -> impl Iterator<Item = &Arbiter> {
+        let index = self.body_index(body).unwrap_or(NONE);
+        self.arbiters.of_body(index).map(|arbiter| self.arbiters.at(arbiter))
+    }
+
+    /// World points of an arbiter's contacts: slot, point on body 1, point on body 2.
+    pub fn contact_points<'a>(&'a self, arbiter: &'a Arbiter) -> impl Iterator<Item = (usize, Vec3, Vec3)> + 'a {
+        let pose = |body: BodyId| self.solver_bodies.masses.get(body.index as usize).copied().unwrap_or_default().pose();
+        let (pose1, pose2) = (pose(arbiter.body1), pose(arbiter.body2));
+        arbiter.data.contacts().map(move |(slot, contact)| {
+            (slot, pose1.transform_point(contact.local_anchor1), pose2.transform_point(contact.local_anchor2))
+        })
+    }
+
+    /// Hands out `count` numbers for keys of your own, which no shape and no other call will get.
+    ///
+    /// # Errors
+    /// If `count` is zero or more than 2⁴⁸.
+    pub fn reserve_ids(&mut self, count: u64) -> Result<Range<u64>, Error> {
+        let fits = self.next_id.checked_add(count).filter(|_| (1..=ID_RANGE_LIMIT).contains(&count));
+        let end = fits.ok_or(Error::IdRange { count, limit: ID_RANGE_LIMIT })?;
+        Ok(std::mem::replace(&mut self.next_id, end)..end)
+    }
+
+    /// The arbiter with this key, made if there is none.
+    ///
+    /// A new one begins in the next step (or in this one, when called by a provider or a begin listener), wakes its bodies,
+    /// and takes the maximum of its bodies' frictions and restitutions. It ends in the first step that finds it without
+    /// contacts.
+    ///
+    /// # Errors
+    /// If a body is unknown, both are the same, neither is dynamic, or the key is in use between other bodies.
+    pub fn get_or_create_arbiter(&mut self, key: ArbiterKey, body1: BodyId, body2: BodyId) -> Result<ArbiterId, Error> {
+        if let Some(index) = self.arbiters.find(key) {
+            let arbiter = self.arbiters.at(index);
+            return if (arbiter.body1, arbiter.body2) == (body1, body2) {
+                Ok(arbiter.id)
+            } else {
+                Err(Error::KeyInUse { key, body1: arbiter.body1, body2: arbiter.body2 })
+            };
+        }
+        let (b1, b2) = (self.body_index(body1)?, self.body_index(body2)?);
+        if b1 == b2 {
+            return Err(Error::SameBody { id: body1 });
+        }
+        let dynamic = |index: u32| self.bodies[index as usize].is_dynamic() && self.bodies[index as usize].enabled;
+        if !dynamic(b1) && !dynamic(b2) {
+            return Err(Error::NeitherMoves { body1, body2 });
+        }
+        let index = self.create_arbiter(key, body1, body2);
+        self.mix_body_materials(index);
+        Ok(self.arbiters.at(index).id)
+    }
+
+    /// Registers a contact with an arbiter, by the cache rules: near an old one it takes its place and its impulses, else it
+    /// takes an empty slot, else that of the contact whose loss leaves the widest patch.
+    ///
+    /// # Errors
+    /// If the arbiter has ended, a point is not finite, or the normal is not of unit length (within 10⁻³).
+    pub fn register_contact(&mut self, arbiter: ArbiterId, contact: ContactPoint) -> Result<(), Error> {
+        let index = self.arbiters.index_of(arbiter).ok_or(Error::UnknownArbiter { id: arbiter })?;
+        validate_point(&contact)?;
+        self.add_contact(index, &contact);
+        Ok(())
+    }
+
+    /// Registers a contact with the arbiter of this key, made if there is none.
+    ///
+    /// # Errors
+    /// As [`World::get_or_create_arbiter`] and [`World::register_contact`]; then no arbiter is made.
+    pub fn register_contact_by_key(
+        &mut self,
+        key: ArbiterKey,
+        body1: BodyId,
+        body2: BodyId,
+        contact: ContactPoint,
+    ) -> Result<ArbiterId, Error> {
+        validate_point(&contact)?;
+        let id = self.get_or_create_arbiter(key, body1, body2)?;
+        self.add_contact(id.index, &contact);
+        Ok(id)
+    }
+
+    /// Ends an arbiter and wakes its bodies. Shapes that still touch begin a new one in the next step.
+    ///
+    /// # Errors
+    /// If it has ended already.
+    pub fn remove_arbiter(&mut self, id: ArbiterId) -> Result<(), Error> {
+        let index = self.arbiters.index_of(id).ok_or(Error::UnknownArbiter { id })?;
+        self.end_arbiter(index, EndReason::ArbiterRemoved);
+        self.flush_events();
+        Ok(())
+    }
+
+    fn add_contact(&mut self, index: u32, point: &ContactPoint) {
+        let arbiter = self.arbiters.at_mut(index);
+        let pose = |body: BodyId| self.solver_bodies.masses[body.index as usize].pose();
+        let normal = point.normal / point.normal.length();
+        let contact = Contact {
+            local_anchor1: pose(arbiter.body1).inverse_transform_point(point.point1),
+            local_anchor2: pose(arbiter.body2).inverse_transform_point(point.point2),
+            normal,
+            separation: (point.point2 - point.point1).dot(normal),
+            remove: point.remove,
+            world_normal: true,
+            ..Contact::default()
+        };
+        arbiter.data.add(contact, self.scaled.contact_break_distance);
+    }
+
+    /// Makes an arbiter whose begin is still to be raised, and wakes its bodies.
+    pub(crate) fn create_arbiter(&mut self, key: ArbiterKey, body1: BodyId, body2: BodyId) -> u32 {
+        let index = self.arbiters.create(key, body1, body2);
+        self.arbiters.at_mut(index).data.solve_mode = SolveMode::FULL;
+        self.events.unbegun.push((key, self.arbiters.at(index).id));
+        self.wake(body1.index);
+        self.wake(body2.index);
+        index
+    }
+
+    /// Ends an arbiter, wakes its bodies, and notes the event if its begin was raised.
+    pub(crate) fn end_arbiter(&mut self, index: u32, reason: EndReason) {
+        let arbiter = self.arbiters.at(index);
+        let (b1, b2, pair) = (arbiter.body1.index, arbiter.body2.index, arbiter.pair);
+        if arbiter.begun {
+            self.events.pending_ends.push(EndEvent {
+                arbiter: arbiter.id,
+                key: arbiter.key,
+                body1: arbiter.body1,
+                body2: arbiter.body2,
+                reason,
+                data: arbiter.data,
+            });
+        }
+        if pair != NONE {
+            self.pairs[pair as usize].arbiter = NONE;
+            self.pairs[pair as usize].has_manifold = false;
+        }
+        self.arbiters.remove(index);
+        if reason != EndReason::Separated || !self.both_awake(b1, b2) {
+            self.wake(b1);
+            self.wake(b2);
+        }
+    }
+
+    fn both_awake(&self, a: u32, b: u32) -> bool {
+        let rests = |index: u32| self.bodies[index as usize].is_dynamic() && !self.bodies[index as usize].awake;
+        !rests(a) && !rests(b)
+    }
+
+    /// Clears the cached contacts of a body: its anchors no longer hold.
+    pub(crate) fn clear_contacts_of(&mut self, body: u32) {
+        let arbiters: Vec<u32> = self.arbiters.of_body(body).collect();
+        for index in arbiters {
+            let arbiter = self.arbiters.at_mut(index);
+            arbiter.data.clear();
+            arbiter.data.usage_mask = 0;
+            if arbiter.pair != NONE {
+                let pair = arbiter.pair;
+                self.pairs[pair as usize].has_manifold = false;
+            }
+        }
+    }
+
+    /// Material of an engine arbiter, from its two shapes; what users have set stays.
+    pub(crate) fn mix_shape_materials(&mut self, index: u32) {
+        let arbiter = self.arbiters.at(index);
+        let pair = &self.pairs[arbiter.pair as usize];
+        let [a, b] = pair.shapes.map(|slot| &self.shapes[slot as usize]);
+        let (ma, mb) = (&a.material, &b.material);
+        let friction = ma.friction_combine.max(mb.friction_combine).combine(ma.friction, mb.friction);
+        let restitution =
+            ma.restitution_combine.max(mb.restitution_combine).combine(ma.restitution, mb.restitution);
+        let radius = max(a.geometry.rounding_radius(), b.geometry.rounding_radius());
+        let radius = if radius > 0.0 { radius } else { 0.25 * max(a.geometry.inner_radius(), b.geometry.inner_radius()) };
+        let rolling = max(ma.rolling_resistance, mb.rolling_resistance) * radius;
+        let velocity = |side: usize, local: Vec3| self.bodies[pair.bodies[side] as usize].pose.rotation.rotate(local);
+        let tangent = velocity(0, ma.tangent_velocity) - velocity(1, mb.tangent_velocity);
+        let data = &mut self.arbiters.at_mut(index).data;
+        let keeps = |flag: u8| data.flags & flag != 0;
+        let (f, r, t, o) = (
+            keeps(FRICTION_OVERRIDDEN),
+            keeps(RESTITUTION_OVERRIDDEN),
+            keeps(TANGENT_VELOCITY_OVERRIDDEN),
+            keeps(ROLLING_OVERRIDDEN),
+        );
+        if !f {
+            data.friction = friction;
+        }
+        if !r {
+            data.restitution = restitution;
+        }
+        if !t {
+            data.tangent_velocity = tangent;
+        }
+        if !o {
+            data.rolling_resistance = rolling;
+        }
+    }
+
+    /// Material of a custom arbiter: the maximum over the shapes of both bodies, or the defaults where neither has any.
+    fn mix_body_materials(&mut self, index: u32) {
+        let arbiter = self.arbiters.at(index);
+        let (mut friction, mut restitution, mut any) = (0.0, 0.0, false);
+        for body in [arbiter.body1.index, arbiter.body2.index] {
+            for &slot in &self.bodies[body as usize].shape_slots {
+                let material = &self.shapes[slot as usize].material;
+                friction = max(friction, material.friction);
+                restitution = max(restitution, material.restitution);
+                any = true;
+            }
+        }
+        let default = super::Material::default();
+        let data = &mut self.arbiters.at_mut(index).data;
+        if data.flags & FRICTION_OVERRIDDEN == 0 {
+            data.friction = if any { friction } else { default.friction };
+        }
+        if data.flags & RESTITUTION_OVERRIDDEN == 0 {
+            data.restitution = if any { restitution } else { default.restitution };
+        }
+    }
+
+    /// Mixes the materials of all arbiters of a body anew.
+    pub(crate) fn refresh_materials_of(&mut self, body: u32) {
+        let arbiters: Vec<u32> = self.arbiters.of_body(body).collect();
+        for index in arbiters {
+            if self.arbiters.at(index).pair == NONE {
+                self.mix_body_materials(index);
+            } else {
+                self.mix_shape_materials(index);
+            }
+        }
+    }
+}
+
+fn validate_point(contact: &ContactPoint) -> Result<(), Error> {
+    finite_vec("point1", contact.point1)?;
+    finite_vec("point2", contact.point2)?;
+    unit_vec("normal", contact.normal).map(|_| ())
+}

@@ -1,0 +1,321 @@
+//! The narrow phase of a step: for each active pair, a new manifold or last step's once more.
+//!
+//! A manifold is used again while the bodies have hardly moved against each other since it was made: the anchors turn and move
+//! with their bodies, so gaps stay exact, and only the choice of points and the normal are old. "Hardly" is relative to the
+//! size of the smaller shape, so small bodies are treated as large ones are. Materials and arbiters are read anew each step
+//! whatever is used again.
+//!
+//! Pairs are independent: they run on all threads, each writing its own arbiter. What begins is gathered and sorted by key.
+
+use super::World;
+use super::bodies::Body;
+use super::pairs::Pair;
+use super::settings::WorldSettings;
+use super::shapes::ShapeSlot;
+use crate::arbiter::{Arbiter, ArbiterKey, Contact, ContactData, EndReason, NONE, SLOTS};
+use crate::math::{Pose, Real, Vec3, max, min};
+use crate::narrow_phase::{Manifold, collide};
+use crate::parallel::SharedSlice;
+use crate::solver::SolverBodies;
+use std::sync::Mutex;
+
+/// Pairs that a thread takes at a time.
+const PAIRS_PER_BLOCK: usize = 64;
+
+/// How far a pair may move, in shares of the smaller shape's inner radius, before its manifold is made anew.
+const REUSE_TRANSLATION: Real = 0.002;
+/// How far a pair may turn (sine of half the angle) before its manifold is made anew: 0.3°.
+const REUSE_ROTATION: Real = 0.0025;
+
+/// What a pair has to tell beyond its own records.
+#[derive(Clone, Copy, Debug)]
+enum News {
+    /// The fat boxes have parted.
+    Apart(u32),
+    /// The shapes begin to touch.
+    Begin(ArbiterKey, u32, Manifold),
+    /// A sensor's overlap has begun or ended.
+    Sensor(u32, bool),
+    /// The arbiter has no contacts.
+    Empty(u32),
+}
+
+/// What all pairs read.
+struct CollideContext<'a> {
+    shapes: &'a [ShapeSlot],
+    bodies: &'a [Body],
+    solver: &'a SolverBodies,
+    broad_phase: &'a crate::broad_phase::BroadPhase,
+    settings: &'a WorldSettings,
+    dt: Real,
+}
+
+/// Buffers of the narrow phase, kept from step to step.
+#[derive(Debug, Default)]
+pub(crate) struct NarrowPhaseScratch {
+    news: Vec<News>,
+    begins: Vec<(ArbiterKey, u32, Manifold)>,
+    apart: Vec<u32>,
+    /// Arbiters that may have nothing left.
+    pub empty: Vec<u32>,
+}
+
+impl World {
+    /// Finds the contacts of all active pairs and makes the arbiters that begin.
+    pub(crate) fn collide_pairs(&mut self, dt: Real) {
+        let mut scratch = std::mem::take(&mut self.narrow);
+        scratch.empty.clear();
+        let news = Mutex::new(std::mem::take(&mut scratch.news));
+        self.run_pairs(dt, &news);
+        scratch.news = news.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+        for item in scratch.news.drain(..) {
+            match item {
+                News::Apart(pair) => scratch.apart.push(pair),
+                News::Begin(key, pair, manifold) => scratch.begins.push((key, pair, manifold)),
+                News::Sensor(pair, overlaps) => self.set_sensor_overlap(pair, overlaps),
+                News::Empty(arbiter) => scratch.empty.push(arbiter),
+            }
+        }
+        scratch.apart.sort_unstable();
+        for pair in scratch.apart.drain(..) {
+            self.remove_pair(pair, EndReason::Separated);
+        }
+        scratch.empty.retain(|&index| self.arbiters.at(index).alive);
+        scratch.begins.sort_unstable_by_key(|begin| begin.0);
+        for (key, pair, manifold) in scratch.begins.drain(..) {
+            self.begin_pair(key, pair, &manifold);
+        }
+        self.narrow = scratch;
+    }
+
+    fn run_pairs(&mut self, dt: Real, news: &Mutex<Vec<News>>) {
+        let context = CollideContext {
+            shapes: &self.shapes,
+            bodies: &self.bodies,
+            solver: &self.solver_bodies,
+            broad_phase: &self.broad_phase,
+            settings: &self.scaled,
+            dt,
+        };
+        let active = &self.active_pairs;
+        let pairs = SharedSlice::new(&mut self.pairs);
+        let arbiters = SharedSlice::new(self.arbiters.slots_mut());
+        let blocks = active.len().div_ceil(PAIRS_PER_BLOCK);
+        self.pool.run(blocks, |block| {
+            let mut found = Vec::new();
+            let start = block * PAIRS_PER_BLOCK;
+            for &index in &active[start..(start + PAIRS_PER_BLOCK).min(active.len())] {
+                // SAFETY: each active pair stands in the list once, and only this block visits it.
+                let pair = unsafe { pairs.get_mut(index as usize) };
+                // SAFETY: an arbiter belongs to one pair.
+                let arbiter =
+                    (pair.arbiter != NONE).then(|| unsafe { arbiters.get_mut(pair.arbiter as usize) });
+                if let Some(item) = context.collide_pair(index, pair, arbiter) {
+                    found.push(item);
+                }
+            }
+            if !found.is_empty() {
+                news.lock().unwrap_or_else(std::sync::PoisonError::into_inner).append(&mut found);
+            }
+        });
+    }
+
+    /// Makes the arbiter of a pair that begins to touch.
+    fn begin_pair(&mut self, key: ArbiterKey, pair_index: u32, manifold: &Manifold) {
+        if self.arbiters.find(key).is_some() {
+            return; // a user holds this key: the shapes collide through that arbiter
+        }
+        let pair = &self.pairs[pair_index as usize];
+        let [b1, b2] = pair.bodies;
+        let relative = self.bodies[b1 as usize].pose.relative(&self.bodies[b2 as usize].pose);
+        let index = self.create_arbiter(key, self.body_id(b1), self.body_id(b2));
+        self.arbiters.at_mut(index).pair = pair_index;
+        let pair = &mut self.pairs[pair_index as usize];
+        (pair.arbiter, pair.has_manifold, pair.manifold_pose) = (index, true, relative);
+        let context = ManifoldFrame::new(&self.pairs[pair_index as usize], &self.shapes, &self.bodies);
+        let arbiter = self.arbiters.at_mut(index);
+        update_contacts(&mut arbiter.data, manifold, &context, self.scaled.contact_break_distance);
+        self.mix_shape_materials(index);
+    }
+
+    /// Whether the shapes of a pair overlap in the present poses.
+    pub(crate) fn pair_overlaps(&self, pair_index: u32) -> bool {
+        let pair = &self.pairs[pair_index as usize];
+        let [a, b] = pair.shapes.map(|slot| &self.shapes[slot as usize]);
+        let pose = |side: usize, shape: &ShapeSlot| self.bodies[pair.bodies[side] as usize].pose.mul(&shape.pose);
+        let relative = pose(0, a).relative(&pose(1, b));
+        let (mut cache, mut manifold) = (pair.cache, Manifold::EMPTY);
+        collide(&a.geometry, &b.geometry, &relative, 0.0, &mut cache, &mut manifold);
+        !manifold.points().is_empty()
+    }
+}
+
+impl CollideContext<'_> {
+    fn collide_pair(&self, index: u32, pair: &mut Pair, arbiter: Option<&mut Arbiter>) -> Option<News> {
+        let [s1, s2] = pair.shapes.map(|slot| &self.shapes[slot as usize]);
+        if (s1.moved || s2.moved) && !self.boxes_overlap(pair) {
+            return Some(News::Apart(index));
+        }
+        let [b1, b2] = pair.bodies.map(|body| &self.bodies[body as usize]);
+        let relative = b1.pose.relative(&b2.pose);
+        if pair.has_manifold && !pair.sensor && self.hardly_moved(pair, &relative, s1, s2) {
+            return None;
+        }
+        let margin = if pair.sensor { 0.0 } else { self.margin(pair, s1, s2) };
+        let mut manifold = Manifold::EMPTY;
+        let shapes_relative = s1.pose.inverse().mul(&relative.mul(&s2.pose));
+        collide(&s1.geometry, &s2.geometry, &shapes_relative, margin, &mut pair.cache, &mut manifold);
+        if pair.sensor {
+            let overlaps = !manifold.points().is_empty();
+            return (overlaps != pair.overlapping).then_some(News::Sensor(index, overlaps));
+        }
+        let frame = ManifoldFrame::new(pair, self.shapes, self.bodies);
+        if let Some(arbiter) = arbiter {
+            (pair.has_manifold, pair.manifold_pose) = (true, relative);
+            update_contacts(&mut arbiter.data, &manifold, &frame, self.settings.contact_break_distance);
+            return manifold.points().is_empty().then_some(News::Empty(pair.arbiter));
+        }
+        let key = ArbiterKey::of_shapes(s1.id, s2.id);
+        self.begins(pair, &manifold, &frame).then_some(News::Begin(key, index, manifold))
+    }
+
+    fn boxes_overlap(&self, pair: &Pair) -> bool {
+        let [a, b] = pair.shapes.map(|slot| self.broad_phase.fat_aabb(slot));
+        matches!((a, b), (Some(a), Some(b)) if a.overlaps(b))
+    }
+
+    /// Whether the pair is so nearly where its manifold was made that the manifold may stay.
+    fn hardly_moved(&self, pair: &Pair, relative: &Pose, s1: &ShapeSlot, s2: &ShapeSlot) -> bool {
+        let size = |shape: &ShapeSlot| {
+            let radius = shape.geometry.inner_radius();
+            if radius > 0.0 { radius } else { Real::MAX }
+        };
+        let limit = REUSE_TRANSLATION * min(size(s1), size(s2));
+        let old = &pair.manifold_pose;
+        let moved = relative.position - old.position;
+        let turned = old.rotation.conjugate().mul(relative.rotation).vector();
+        let reach = max(self.bodies[pair.bodies[0] as usize].reach, 0.0);
+        let _ = reach;
+        moved.length_squared() < limit * limit && turned.length_squared() < REUSE_ROTATION * REUSE_ROTATION
+    }
+
+    /// Gap up to which contacts count: the speculative distance, more for pairs that move fast against each other, but not
+    /// more than the smaller shape (past that, continuous collision takes over).
+    fn margin(&self, pair: &Pair, s1: &ShapeSlot, s2: &ShapeSlot) -> Real {
+        let [v1, v2] = pair.bodies.map(|body| &self.solver.states[body as usize]);
+        let closing = (v2.linear_velocity - v1.linear_velocity).length() * self.dt;
+        let (r1, r2) = (s1.geometry.inner_radius(), s2.geometry.inner_radius());
+        let size = match (r1 > 0.0, r2 > 0.0) {
+            (true, true) => min(r1, r2),
+            _ => max(r1, r2),
+        };
+        max(self.settings.speculative_distance, min(closing, size))
+    }
+
+    /// Whether a pair without arbiter touches, or closes fast enough to touch within this step.
+    fn begins(&self, pair: &Pair, manifold: &Manifold, frame: &ManifoldFrame) -> bool {
+        let [(v1, a1), (v2, a2)] =
+            pair.bodies.map(|body| (&self.solver.states[body as usize], &self.solver.motions[body as usize]));
+        let center = pair.bodies.map(|body| self.solver.masses[body as usize].center);
+        manifold.points().iter().any(|point| {
+            if point.separation <= 0.0 {
+                return true;
+            }
+            let (at, normal) = (frame.world_point(point.point1), frame.world_direction(point.normal));
+            let velocity1 = v1.linear_velocity + v1.angular_velocity.cross(at - center[0]);
+            let velocity2 = v2.linear_velocity + v2.angular_velocity.cross(at - center[1]);
+            let speed = normal.dot(velocity2 - velocity1) + normal.dot(a2.acceleration - a1.acceleration) * self.dt;
+            point.separation + speed * self.dt <= 0.0
+        })
+    }
+}
+
+/// How a manifold in the frame of shape 1 becomes contacts.
+struct ManifoldFrame {
+    /// Shape 1 in the world.
+    shape: Pose,
+    body1: Pose,
+    body2: Pose,
+    center1: Vec3,
+    center2: Vec3,
+}
+
+impl ManifoldFrame {
+    fn new(pair: &Pair, shapes: &[ShapeSlot], bodies: &[Body]) -> Self {
+        let [b1, b2] = pair.bodies.map(|body| &bodies[body as usize]);
+        Self {
+            shape: b1.pose.mul(&shapes[pair.shapes[0] as usize].pose),
+            body1: b1.pose,
+            body2: b2.pose,
+            center1: b1.mass.center,
+            center2: b2.mass.center,
+        }
+    }
+
+    fn world_point(&self, point: Vec3) -> Vec3 {
+        self.shape.transform_point(point)
+    }
+
+    fn world_direction(&self, direction: Vec3) -> Vec3 {
+        self.shape.rotation.rotate(direction)
+    }
+
+    fn contact(&self, point: &crate::narrow_phase::ManifoldPoint) -> Contact {
+        let normal = self.world_direction(point.normal);
+        Contact {
+            local_anchor1: self.body1.inverse_transform_point(self.world_point(point.point1)) - self.center1,
+            local_anchor2: self.body2.inverse_transform_point(self.world_point(point.point2())) - self.center2,
+            normal,
+            local_normal: self.body1.rotation.inverse_rotate(normal),
+            separation: point.separation,
+            feature: point.feature,
+            ..Contact::default()
+        }
+    }
+}
+
+/// Replaces the contacts of an arbiter by a new manifold; points that were there before keep their slot and impulses.
+///
+/// A point is the same when its features are; else when an old one not yet taken is within the break distance.
+fn update_contacts(data: &mut ContactData, manifold: &Manifold, frame: &ManifoldFrame, break_distance: Real) {
+    let old = data.slots;
+    let mut unclaimed = (data.usage_mask & 15) | data.usage_mask >> 4;
+    let mut matches = [SLOTS; SLOTS];
+    let mut contacts = [Contact::default(); SLOTS];
+    let points = manifold.points();
+    for (i, point) in points.iter().enumerate() {
+        contacts[i] = frame.contact(point);
+        if let Some(slot) = (0..SLOTS).find(|&s| unclaimed >> s & 1 == 1 && old[s].feature == point.feature) {
+            matches[i] = slot;
+            unclaimed &= !(1 << slot);
+        }
+    }
+    for i in 0..points.len() {
+        if matches[i] == SLOTS {
+            let near = |s: usize| (old[s].local_anchor1 - contacts[i].local_anchor1).length_squared();
+            let mut best = break_distance * break_distance;
+            for slot in (0..SLOTS).filter(|&s| unclaimed >> s & 1 == 1) {
+                if near(slot) < best {
+                    best = near(slot);
+                    matches[i] = slot;
+                }
+            }
+            if matches[i] < SLOTS {
+                unclaimed &= !(1 << matches[i]);
+            }
+        }
+    }
+    let mut used: u8 = matches.iter().filter(|&&slot| slot < SLOTS).fold(0, |mask, &slot| mask | 1 << slot);
+    let claimed = used;
+    for i in 0..points.len() {
+        if matches[i] < SLOTS {
+            contacts[i].inherit(&old[matches[i]]);
+        } else {
+            matches[i] = (!used).trailing_zeros() as usize;
+            used |= 1 << matches[i];
+        }
+        data.slots[matches[i]] = contacts[i];
+    }
+    debug_assert!(claimed & !15 == 0);
+    data.usage_mask = data.usage_mask & 0xf0 | used;
+}

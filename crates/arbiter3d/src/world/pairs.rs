@@ -1,0 +1,161 @@
+//! Broad-phase pairs: two shapes whose fat boxes overlap, from when they come near until they part.
+//!
+//! A pair remembers what the narrow phase may use again: its arbiter, the last separating feature, and the relative pose at
+//! the last full manifold. The pairs of a body hang on a doubly linked list through the records; those with an awake body
+//! stand in `active_pairs`.
+
+use super::World;
+use super::definition::BodyKind;
+use crate::arbiter::{EndReason, NONE};
+use crate::math::Pose;
+use crate::narrow_phase::PairCache;
+
+/// What the world keeps of a pair. Shape 1 has the smaller id.
+#[derive(Clone, Debug)]
+pub(crate) struct Pair {
+    pub shapes: [u32; 2],
+    pub bodies: [u32; 2],
+    /// `NONE` while the shapes do not touch.
+    pub arbiter: u32,
+    /// Place among the active pairs; `NONE` while both bodies rest.
+    pub active_place: u32,
+    pub alive: bool,
+    pub sensor: bool,
+    /// For sensors: whether the shapes overlap.
+    pub overlapping: bool,
+    /// Whether `manifold_pose` holds: cleared by teleports and edits.
+    pub has_manifold: bool,
+    /// Body 2 seen from body 1 when the manifold was made.
+    pub manifold_pose: Pose,
+    pub cache: PairCache,
+    next: [u32; 2],
+    previous: [u32; 2],
+}
+
+impl Pair {
+    pub fn has_shape(&self, slot: u32) -> bool {
+        self.shapes[0] == slot || self.shapes[1] == slot
+    }
+}
+
+impl World {
+    /// Whether two shapes may have a pair at all.
+    pub(crate) fn may_pair(&self, a: u32, b: u32) -> bool {
+        let (shape_a, shape_b) = (&self.shapes[a as usize], &self.shapes[b as usize]);
+        if shape_a.body == shape_b.body || !shape_a.filter.accepts(&shape_b.filter) {
+            return false;
+        }
+        let (kind_a, kind_b) = (self.bodies[shape_a.body as usize].kind, self.bodies[shape_b.body as usize].kind);
+        let dynamic = kind_a == BodyKind::Dynamic || kind_b == BodyKind::Dynamic;
+        match (shape_a.sensor, shape_b.sensor) {
+            (true, true) => false,
+            (false, false) => dynamic && (shape_a.geometry.is_convex() || shape_b.geometry.is_convex()),
+            _ => kind_a != BodyKind::Static || kind_b != BodyKind::Static,
+        }
+    }
+
+    /// Makes a pair of two shapes that have none yet.
+    pub(crate) fn add_pair(&mut self, a: u32, b: u32) {
+        let smaller_first = self.shapes[a as usize].id < self.shapes[b as usize].id;
+        let shapes = if smaller_first { [a, b] } else { [b, a] };
+        let bodies = shapes.map(|slot| self.shapes[slot as usize].body);
+        let pair = Pair {
+            shapes,
+            bodies,
+            arbiter: NONE,
+            active_place: NONE,
+            alive: true,
+            sensor: shapes.iter().any(|&slot| self.shapes[slot as usize].sensor),
+            overlapping: false,
+            has_manifold: false,
+            manifold_pose: Pose::IDENTITY,
+            cache: PairCache::default(),
+            next: [NONE; 2],
+            previous: [NONE; 2],
+        };
+        let index = if let Some(index) = self.free_pairs.pop() {
+            self.pairs[index as usize] = pair;
+            index
+        } else {
+            self.pairs.push(pair);
+            (self.pairs.len() - 1) as u32
+        };
+        self.pair_set.insert(a, b, index);
+        self.link_pair(index, 0);
+        self.link_pair(index, 1);
+        if bodies.iter().any(|&body| self.bodies[body as usize].awake) {
+            self.activate_pair(index);
+        }
+    }
+
+    /// Ends a pair: its arbiter ends for `reason`, a sensor's overlap ends too.
+    pub(crate) fn remove_pair(&mut self, index: u32, reason: EndReason) {
+        let pair = self.pairs[index as usize].clone();
+        if pair.arbiter != NONE {
+            self.end_arbiter(pair.arbiter, reason);
+        }
+        if pair.overlapping {
+            self.set_sensor_overlap(index, false);
+        }
+        self.deactivate_pair(index);
+        self.unlink_pair(index, 0);
+        self.unlink_pair(index, 1);
+        self.pair_set.remove(pair.shapes[0], pair.shapes[1]);
+        self.pairs[index as usize].alive = false;
+        self.free_pairs.push(index);
+    }
+
+    /// The pairs of a body.
+    pub(crate) fn pairs_of_body(&self, body: u32) -> impl Iterator<Item = u32> + '_ {
+        let mut edge = self.bodies[body as usize].first_pair;
+        std::iter::from_fn(move || {
+            if edge == NONE {
+                return None;
+            }
+            let index = edge >> 1;
+            edge = self.pairs[index as usize].next[(edge & 1) as usize];
+            Some(index)
+        })
+    }
+
+    pub(crate) fn activate_pair(&mut self, index: u32) {
+        if self.pairs[index as usize].active_place == NONE {
+            self.pairs[index as usize].active_place = self.active_pairs.len() as u32;
+            self.active_pairs.push(index);
+        }
+    }
+
+    pub(crate) fn deactivate_pair(&mut self, index: u32) {
+        let place = std::mem::replace(&mut self.pairs[index as usize].active_place, NONE);
+        if place != NONE {
+            self.active_pairs.swap_remove(place as usize);
+            if let Some(&moved) = self.active_pairs.get(place as usize) {
+                self.pairs[moved as usize].active_place = place;
+            }
+        }
+    }
+
+    fn link_pair(&mut self, index: u32, side: usize) {
+        let body = self.pairs[index as usize].bodies[side] as usize;
+        let edge = index * 2 + side as u32;
+        let head = std::mem::replace(&mut self.bodies[body].first_pair, edge);
+        let pair = &mut self.pairs[index as usize];
+        (pair.next[side], pair.previous[side]) = (head, NONE);
+        if head != NONE {
+            self.pairs[(head >> 1) as usize].previous[(head & 1) as usize] = edge;
+        }
+    }
+
+    fn unlink_pair(&mut self, index: u32, side: usize) {
+        let pair = &self.pairs[index as usize];
+        let (next, previous, body) = (pair.next[side], pair.previous[side], pair.bodies[side]);
+        if next != NONE {
+            self.pairs[(next >> 1) as usize].previous[(next & 1) as usize] = previous;
+        }
+        if previous == NONE {
+            self.bodies[body as usize].first_pair = next;
+        } else {
+            self.pairs[(previous >> 1) as usize].next[(previous & 1) as usize] = next;
+        }
+    }
+}

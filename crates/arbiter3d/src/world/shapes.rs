@@ -1,0 +1,327 @@
+//! Shapes on bodies: what the world keeps of them, and how users read and change them.
+
+use super::World;
+use super::definition::{BodyKind, Filter, Material, ShapeDefinition};
+use super::error::{Error, unit_rotation};
+use super::id::{BodyId, ShapeId};
+use crate::arbiter::{EndReason, NONE};
+use crate::broad_phase::TreeKind;
+use crate::math::{Aabb, Pose, Quat, Real, Vec3};
+use crate::shape::Shape;
+
+/// What the world keeps of a shape.
+#[derive(Clone, Debug)]
+pub(crate) struct ShapeSlot {
+    pub id: ShapeId,
+    /// Body slot; `NONE` for a free place.
+    pub body: u32,
+    /// Where the shape's frame sits on the body.
+    pub pose: Pose,
+    pub geometry: Shape,
+    pub density: Real,
+    pub material: Material,
+    pub filter: Filter,
+    pub sensor: bool,
+    /// Whether its proxy has moved since the last narrow phase.
+    pub moved: bool,
+    pub user_data: u128,
+}
+
+/// A shape, to read.
+///
+/// ```
+/// use arbiter3d::{BodyId, Shape, ShapeDefinition, World, math::Vec3};
+/// let mut world = World::default();
+/// let floor = world.add_shape(BodyId::WORLD, &ShapeDefinition::new(Shape::cuboid(Vec3::new(10.0, 1.0, 10.0))?))?;
+/// assert_eq!(world.shape(floor).unwrap().body(), BodyId::WORLD);
+/// # Ok::<(), arbiter3d::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct ShapeRef<'a> {
+    world: &'a World,
+    slot: &'a ShapeSlot,
+}
+
+/// A shape, to read and change.
+///
+/// ```
+/// use arbiter3d::{BodyId, Material, Shape, ShapeDefinition, World, math::Vec3};
+/// let mut world = World::default();
+/// let floor = world.add_shape(BodyId::WORLD, &ShapeDefinition::new(Shape::cuboid(Vec3::new(10.0, 1.0, 10.0))?))?;
+/// let ice = Material { friction: 0.0, ..Material::default() };
+/// world.shape_mut(floor).unwrap().set_material(ice)?;
+/// # Ok::<(), arbiter3d::Error>(())
+/// ```
+#[derive(Debug)]
+pub struct ShapeMut<'a> {
+    world: &'a mut World,
+    slot: u32,
+}
+
+impl<'a> ShapeRef<'a> {
+    pub(crate) fn new(world: &'a World, slot: u32) -> Self {
+        Self { world, slot: &world.shapes[slot as usize] }
+    }
+
+    /// Its id.
+    #[must_use]
+    pub fn id(&self) -> ShapeId {
+        self.slot.id
+    }
+
+    /// The body that carries it.
+    #[must_use]
+    pub fn body(&self) -> BodyId {
+        self.world.body_id(self.slot.body)
+    }
+
+    /// The geometry.
+    #[must_use]
+    pub fn geometry(&self) -> &'a Shape {
+        &self.slot.geometry
+    }
+
+    /// Where its frame sits on the body, metres.
+    #[must_use]
+    pub fn position(&self) -> Vec3 {
+        self.slot.pose.position
+    }
+
+    /// How its frame is turned on the body.
+    #[must_use]
+    pub fn rotation(&self) -> Quat {
+        self.slot.pose.rotation.to_quat()
+    }
+
+    /// Pose of its frame in the world.
+    #[must_use]
+    pub fn world_pose(&self) -> Pose {
+        self.world.bodies[self.slot.body as usize].pose.mul(&self.slot.pose)
+    }
+
+    /// The box around it, world.
+    #[must_use]
+    pub fn aabb(&self) -> Aabb {
+        self.slot.geometry.aabb(&self.world_pose())
+    }
+
+    /// Mass per volume, kg/m³.
+    #[must_use]
+    pub fn density(&self) -> Real {
+        self.slot.density
+    }
+
+    /// The surface.
+    #[must_use]
+    pub fn material(&self) -> Material {
+        self.slot.material
+    }
+
+    /// Which shapes it meets.
+    #[must_use]
+    pub fn filter(&self) -> Filter {
+        self.slot.filter
+    }
+
+    /// Whether it only reports overlaps.
+    #[must_use]
+    pub fn is_sensor(&self) -> bool {
+        self.slot.sensor
+    }
+
+    /// Yours.
+    #[must_use]
+    pub fn user_data(&self) -> u128 {
+        self.slot.user_data
+    }
+}
+
+impl<'a> ShapeMut<'a> {
+    pub(crate) fn new(world: &'a mut World, slot: u32) -> Self {
+        Self { world, slot }
+    }
+
+    /// The same shape, to read.
+    #[must_use]
+    pub fn read(&self) -> ShapeRef<'_> {
+        ShapeRef::new(self.world, self.slot)
+    }
+
+    fn slot(&mut self) -> &mut ShapeSlot {
+        &mut self.world.shapes[self.slot as usize]
+    }
+
+    /// Changes the surface. Live arbiters of the shape follow in the next step, but for what users have set on them.
+    ///
+    /// # Errors
+    /// If a number is not finite or out of its range.
+    pub fn set_material(&mut self, material: Material) -> Result<(), Error> {
+        material.validate()?;
+        self.slot().material = material;
+        let body = self.slot().body;
+        self.world.refresh_materials_of(body);
+        Ok(())
+    }
+
+    /// Changes which shapes it meets; arbiters that this rules out end at once, and the bodies wake.
+    pub fn set_filter(&mut self, filter: Filter) {
+        self.slot().filter = filter;
+        self.world.renew_proxy(self.slot, EndReason::FilterChanged);
+        self.world.flush_events();
+    }
+
+    /// Makes it a sensor or a solid shape; its arbiters end, and the bodies wake.
+    pub fn set_sensor(&mut self, sensor: bool) {
+        if self.slot().sensor != sensor {
+            self.slot().sensor = sensor;
+            let body = self.slot().body;
+            self.world.renew_proxy(self.slot, EndReason::FilterChanged);
+            self.world.update_mass(body);
+            self.world.flush_events();
+        }
+    }
+
+    /// Changes the density, kg/m³, and with it the mass of the body.
+    ///
+    /// # Errors
+    /// If it is not from 0 to 10¹².
+    pub fn set_density(&mut self, density: Real) -> Result<(), Error> {
+        self.slot().density = super::error::in_range("density", density, 0.0, 1e12)?;
+        let body = self.slot().body;
+        self.world.update_mass(body);
+        Ok(())
+    }
+
+    /// Sets what is yours.
+    pub fn set_user_data(&mut self, user_data: u128) {
+        self.slot().user_data = user_data;
+    }
+}
+
+impl World {
+    pub(crate) fn shape_slot(&self, id: ShapeId) -> Result<u32, Error> {
+        self.shape_slots.get(&id.0).copied().ok_or(Error::UnknownShape { id })
+    }
+
+    /// Attaches a shape to a body and returns its id. The body's mass follows unless it was given.
+    ///
+    /// # Errors
+    /// If the body is unknown, a number is out of its range, or a mesh would go on a dynamic body.
+    pub fn add_shape(&mut self, body: BodyId, definition: &ShapeDefinition) -> Result<ShapeId, Error> {
+        let index = self.body_index(body)?;
+        definition.validate()?;
+        let rotation = unit_rotation("shape rotation", definition.rotation)?;
+        if !definition.shape.is_convex() && self.bodies[index as usize].kind == BodyKind::Dynamic {
+            return Err(Error::MeshNotDynamic);
+        }
+        let id = ShapeId(self.next_id);
+        self.next_id += 1;
+        let shape = ShapeSlot {
+            id,
+            body: index,
+            pose: Pose::new(definition.position, rotation),
+            geometry: definition.shape.clone(),
+            density: definition.density,
+            material: definition.material,
+            filter: definition.filter,
+            sensor: definition.sensor,
+            moved: true,
+            user_data: definition.user_data,
+        };
+        let slot = if let Some(slot) = self.free_shapes.pop() {
+            self.shapes[slot as usize] = shape;
+            slot
+        } else {
+            self.shapes.push(shape);
+            (self.shapes.len() - 1) as u32
+        };
+        self.shape_slots.insert(id.0, slot);
+        let owner = &mut self.bodies[index as usize];
+        owner.shapes.push(id);
+        owner.shape_slots.push(slot);
+        if owner.enabled {
+            self.add_proxy(slot);
+        }
+        self.update_mass(index);
+        self.wake(index);
+        Ok(id)
+    }
+
+    /// Removes a shape; its arbiters end, and what touched it wakes.
+    ///
+    /// # Errors
+    /// If the shape is unknown.
+    pub fn remove_shape(&mut self, id: ShapeId) -> Result<(), Error> {
+        let slot = self.shape_slot(id)?;
+        let body = self.shapes[slot as usize].body;
+        self.drop_shape(slot, EndReason::ShapeRemoved);
+        let owner = &mut self.bodies[body as usize];
+        owner.shapes.retain(|&other| other != id);
+        owner.shape_slots.retain(|&other| other != slot);
+        self.update_mass(body);
+        self.wake(body);
+        self.flush_events();
+        Ok(())
+    }
+
+    /// Frees the place of a shape; the body's lists are the caller's to mend.
+    pub(crate) fn drop_shape(&mut self, slot: u32, reason: EndReason) {
+        self.remove_proxy(slot, reason);
+        let shape = &mut self.shapes[slot as usize];
+        self.shape_slots.remove(&shape.id.0);
+        shape.body = NONE;
+        self.free_shapes.push(slot);
+    }
+
+    pub(crate) fn carries_mesh(&self, body: u32) -> bool {
+        let slots = &self.bodies[body as usize].shape_slots;
+        slots.iter().any(|&slot| !self.shapes[slot as usize].geometry.is_convex())
+    }
+
+    /// Box of a shape now.
+    pub(crate) fn tight_aabb(&self, slot: u32) -> Aabb {
+        let shape = &self.shapes[slot as usize];
+        shape.geometry.aabb(&self.bodies[shape.body as usize].pose.mul(&shape.pose))
+    }
+
+    /// Box that a shape may move in before the broad phase hears of it: 12.5 % of its radius, at most 5 cm, beyond the
+    /// speculative distance.
+    pub(crate) fn fat_margin(&self, slot: u32) -> Real {
+        let shape = &self.shapes[slot as usize];
+        let settings = &self.scaled;
+        let radius = shape.geometry.local_aabb().half_extents().length();
+        let still = self.bodies[shape.body as usize].kind == BodyKind::Static;
+        let creep = if still { 0.0 } else { crate::math::min(0.125 * radius, 2.5 * settings.speculative_distance) };
+        settings.speculative_distance + creep
+    }
+
+    pub(crate) fn add_proxy(&mut self, slot: u32) {
+        let fat = self.tight_aabb(slot).expand(self.fat_margin(slot));
+        let kind = match self.bodies[self.shapes[slot as usize].body as usize].kind {
+            BodyKind::Static => TreeKind::Static,
+            BodyKind::Kinematic | BodyKind::Dynamic => TreeKind::Moving,
+        };
+        self.broad_phase.add(slot, kind, fat);
+        self.shapes[slot as usize].moved = true;
+    }
+
+    /// Takes a shape out of the broad phase with all its pairs.
+    pub(crate) fn remove_proxy(&mut self, slot: u32, reason: EndReason) {
+        let body = self.shapes[slot as usize].body;
+        let pairs: Vec<u32> = self.pairs_of_body(body).filter(|&pair| self.pairs[pair as usize].has_shape(slot)).collect();
+        for pair in pairs {
+            self.remove_pair(pair, reason);
+        }
+        self.broad_phase.remove(slot);
+    }
+
+    /// Finds the pairs of a shape anew.
+    pub(crate) fn renew_proxy(&mut self, slot: u32, reason: EndReason) {
+        let body = self.shapes[slot as usize].body;
+        self.remove_proxy(slot, reason);
+        if self.bodies[body as usize].enabled {
+            self.add_proxy(slot);
+        }
+        self.wake(body);
+    }
+}

@@ -1,0 +1,429 @@
+//! The step, phase by phase.
+
+use super::World;
+use super::bodies::world_inverse_inertia;
+use super::error::{Error, in_range};
+use super::id::BodyId;
+use super::timings::{Phase, PhaseClock};
+use crate::arbiter::{EndReason, NONE};
+use crate::math::{Aabb, Real, Vec3, min};
+use crate::parallel::SharedSlice;
+use crate::solver::{
+    IntegrateParameters, Pass, PassParameters, PrepareContext, Softness, StoreTarget, integrate_position,
+    integrate_velocity,
+};
+use std::sync::Mutex;
+
+/// Bodies that a thread takes at a time.
+const BODIES_PER_BLOCK: usize = 128;
+
+/// What a step has to report beyond events.
+///
+/// ```
+/// let mut world = arbiter3d::World::default();
+/// let report = world.step(1.0 / 60.0)?;
+/// assert!(report.frozen.is_empty());
+/// # Ok::<(), arbiter3d::Error>(())
+/// ```
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct StepReport {
+    /// Bodies that went non-finite in this step: put back to their last finite pose and stopped, until they are set free by
+    /// setting their pose or velocity.
+    pub frozen: Vec<BodyId>,
+}
+
+/// What a body's finalizing has to tell.
+#[derive(Clone, Copy, Debug)]
+enum BodyNews {
+    /// The box of a shape has left its fat box.
+    Moved { shape: u32, tight: Aabb, fat: Aabb },
+    /// The body may have passed through something.
+    Fast(u32),
+    /// The body went non-finite.
+    Broken(u32),
+}
+
+/// Buffers of the step, kept from one to the next.
+#[derive(Debug, Default)]
+pub(crate) struct StepScratch {
+    pairs: Vec<(u32, u32)>,
+    may_break: Vec<bool>,
+    news: Vec<BodyNews>,
+    moved: Vec<u32>,
+    sorted_awake: Vec<u32>,
+}
+
+impl StepScratch {
+    /// Has the next narrow phase test the pairs of a shape.
+    pub fn note_moved(&mut self, slot: u32) {
+        self.moved.push(slot);
+    }
+}
+
+impl World {
+    /// Advances the world by `dt` seconds. Zero does nothing.
+    ///
+    /// # Errors
+    /// If `dt` is not finite, negative, or longer than a second.
+    pub fn step(&mut self, dt: Real) -> Result<StepReport, Error> {
+        in_range("dt", dt, 0.0, 1.0)?;
+        let mut report = StepReport::default();
+        if dt < 1e-9 {
+            return Ok(report);
+        }
+        let mut clock = PhaseClock::start();
+        self.events.begin_step();
+        self.flush_events();
+        self.apply_forces(dt);
+        self.find_pairs();
+        clock.mark(Phase::BroadPhase);
+        self.collide_pairs(dt);
+        self.call_providers();
+        clock.mark(Phase::NarrowPhase);
+        self.raise_begin();
+        clock.mark(Phase::BeginEvents);
+        self.plan_rows();
+        clock.mark(Phase::Coloring);
+        self.prepare_rows();
+        clock.mark(Phase::Prepare);
+        self.solve(dt);
+        clock.mark(Phase::Solve);
+        self.store_rows();
+        clock.mark(Phase::Store);
+        self.finalize(dt, &mut report);
+        clock.mark(Phase::Finalize);
+        self.end_broken();
+        self.flush_events();
+        clock.mark(Phase::EndEvents);
+        self.sleep_islands();
+        self.events.end_step();
+        clock.mark(Phase::Sleep);
+        self.timings = clock.finish();
+        #[cfg(debug_assertions)]
+        if let Err(broken) = self.validate_quick() {
+            unreachable!("the world is inconsistent after a step, a bug in arbiter3d: {broken}");
+        }
+        Ok(report)
+    }
+
+    /// Turns gravity and forces into this step's accelerations.
+    fn apply_forces(&mut self, dt: Real) {
+        self.scratch.sorted_awake.clone_from(&self.awake);
+        self.scratch.sorted_awake.sort_unstable();
+        let gravity = self.settings.gravity;
+        for &index in &self.scratch.sorted_awake {
+            let body = &mut self.bodies[index as usize];
+            let motion = &mut self.solver_bodies.motions[index as usize];
+            let mass = &self.solver_bodies.masses[index as usize];
+            let (free, _) = body.locked_axes.free();
+            let dynamic = !motion.kinematic && !body.frozen;
+            motion.acceleration =
+                if dynamic { gravity * body.gravity_scale * free + mass.inverse_mass * body.force } else { Vec3::ZERO };
+            motion.angular_acceleration = if dynamic { mass.inverse_inertia.mul(body.torque) } else { Vec3::ZERO };
+            (body.force, body.torque) = (Vec3::ZERO, Vec3::ZERO);
+            let state = &mut self.solver_bodies.states[index as usize];
+            (state.translation, state.turn, state.constrained) = (Vec3::ZERO, Vec3::ZERO, 0);
+        }
+        let _ = dt;
+    }
+
+    /// Finds the pairs of shapes that have moved.
+    fn find_pairs(&mut self) {
+        let mut found = std::mem::take(&mut self.scratch.pairs);
+        let mut broad_phase = std::mem::take(&mut self.broad_phase);
+        broad_phase.find_pairs(|a, b| !self.pair_set.contains(a, b) && self.may_pair(a, b), &mut found);
+        self.broad_phase = broad_phase;
+        for &(a, b) in &found {
+            self.add_pair(a, b);
+        }
+        found.clear();
+        self.scratch.pairs = found;
+    }
+
+    fn call_providers(&mut self) {
+        let mut providers = std::mem::take(&mut self.providers);
+        for provider in &mut providers {
+            provider.provide(&mut super::events::StepContext::new(self));
+        }
+        self.providers = providers;
+        for shape in self.scratch.moved.drain(..) {
+            self.shapes[shape as usize].moved = false;
+        }
+    }
+
+    fn plan_rows(&mut self) {
+        self.arbiters.awake_by_key();
+        let (order, arbiters) = self.arbiters.order_and_slots_mut();
+        self.plan.build(order, arbiters, &mut self.solver_bodies);
+    }
+
+    fn prepare_rows(&mut self) {
+        let context = PrepareContext {
+            arbiters: self.arbiters.slots(),
+            bodies: &self.solver_bodies,
+            speculative_distance: self.scaled.speculative_distance,
+        };
+        self.solver.prepare(&self.plan, &context, &mut self.pool);
+    }
+
+    /// The substeps, then restitution.
+    fn solve(&mut self, dt: Real) {
+        let settings = self.scaled;
+        let substep = dt / settings.substeps as Real;
+        let hertz = min(settings.contact_hertz, 0.125 / substep);
+        let pass = |softness: Softness| PassParameters {
+            inverse_substep: 1.0 / substep,
+            push_out_speed: settings.push_out_speed,
+            softness,
+            restitution_threshold: settings.restitution_threshold,
+        };
+        // Against the ground twice as stiff: what stands on it has the weight of all above.
+        let soft = pass(Softness::new(hertz, settings.contact_damping_ratio, substep));
+        let stiff = pass(Softness::new(2.0 * hertz, 0.5 * settings.contact_damping_ratio, substep));
+        let integrate = IntegrateParameters {
+            substep,
+            max_linear_speed: settings.max_linear_speed,
+            max_angular_speed: 1.5 / substep,
+        };
+        for index in 0..settings.substeps {
+            self.integrate_velocities(&integrate, index == 0);
+            if index == 0 {
+                self.run_pass(Pass::WarmStart, &soft, &stiff);
+            }
+            self.run_pass(Pass::Solve, &soft, &stiff);
+            self.integrate_positions(&integrate);
+            self.run_pass(Pass::Relax, &soft, &stiff);
+        }
+        self.run_pass(Pass::Restitution, &soft, &stiff);
+    }
+
+    fn run_pass(&mut self, pass: Pass, soft: &PassParameters, stiff: &PassParameters) {
+        for (index, group) in self.plan.groups.iter().enumerate() {
+            let parameters = if group.fixed { stiff } else { soft };
+            self.solver.pass(index, pass, &mut self.solver_bodies.states, parameters, &mut self.pool);
+        }
+    }
+
+    fn integrate_velocities(&mut self, parameters: &IntegrateParameters, first: bool) {
+        let awake = &self.scratch.sorted_awake;
+        let states = SharedSlice::new(&mut self.solver_bodies.states);
+        let motions = SharedSlice::new(&mut self.solver_bodies.motions);
+        self.pool.run(awake.len().div_ceil(BODIES_PER_BLOCK), |block| {
+            for &body in block_of(awake, block) {
+                // SAFETY: a body stands in the list once.
+                let (state, motion) = unsafe { (states.get_mut(body as usize), motions.get_mut(body as usize)) };
+                integrate_velocity(state, motion, parameters, first);
+            }
+        });
+    }
+
+    fn integrate_positions(&mut self, parameters: &IntegrateParameters) {
+        let awake = &self.scratch.sorted_awake;
+        let states = SharedSlice::new(&mut self.solver_bodies.states);
+        let motions = SharedSlice::new(&mut self.solver_bodies.motions);
+        let masses = SharedSlice::new(&mut self.solver_bodies.masses);
+        self.pool.run(awake.len().div_ceil(BODIES_PER_BLOCK), |block| {
+            for &body in block_of(awake, block) {
+                let index = body as usize;
+                // SAFETY: a body stands in the list once.
+                let (state, motion, mass) =
+                    unsafe { (states.get_mut(index), motions.get_mut(index), masses.get_mut(index)) };
+                integrate_position(state, motion, mass, parameters);
+            }
+        });
+    }
+
+    /// Impulses back to the arbiters. Whose contacts may have broken is noted.
+    fn store_rows(&mut self) {
+        let mut may_break = std::mem::take(&mut self.scratch.may_break);
+        may_break.clear();
+        may_break.resize(self.plan.rows.len(), false);
+        let target = StoreTarget {
+            plan: &self.plan,
+            arbiters: self.arbiters.slots_mut(),
+            bodies: &self.solver_bodies,
+            break_distance: self.scaled.contact_break_distance,
+            may_break: &mut may_break,
+        };
+        self.solver.store(target, &mut self.pool);
+        self.scratch.may_break = may_break;
+    }
+
+    /// New poses, boxes and rest times; then continuous collision for the fast.
+    fn finalize(&mut self, dt: Real, report: &mut StepReport) {
+        let news = Mutex::new(std::mem::take(&mut self.scratch.news));
+        self.finalize_bodies(dt, &news);
+        let mut news = news.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+        // Threads report in any order; the trees and the report must not depend on it.
+        news.sort_unstable_by_key(|item| match *item {
+            BodyNews::Broken(body) => (0, body),
+            BodyNews::Fast(body) => (1, body),
+            BodyNews::Moved { shape, .. } => (2, shape),
+        });
+        for item in news.drain(..) {
+            match item {
+                BodyNews::Broken(body) => {
+                    self.freeze(body);
+                    report.frozen.push(self.body_id(body));
+                }
+                BodyNews::Fast(body) => self.stop_at_impact(body),
+                BodyNews::Moved { shape, tight, fat } => {
+                    if self.broad_phase.update(shape, &tight, &fat) {
+                        self.shapes[shape as usize].moved = true;
+                        self.scratch.moved.push(shape);
+                    }
+                }
+            }
+        }
+        self.scratch.news = news;
+    }
+
+    fn finalize_bodies(&mut self, dt: Real, news: &Mutex<Vec<BodyNews>>) {
+        let awake = &self.scratch.sorted_awake;
+        let world = FinalizeContext {
+            shapes: &self.shapes,
+            broad_phase: &self.broad_phase,
+            settings: &self.scaled,
+            dt,
+        };
+        let bodies = SharedSlice::new(&mut self.bodies);
+        let states = SharedSlice::new(&mut self.solver_bodies.states);
+        let motions = SharedSlice::new(&mut self.solver_bodies.motions);
+        let masses = SharedSlice::new(&mut self.solver_bodies.masses);
+        self.pool.run(awake.len().div_ceil(BODIES_PER_BLOCK), |block| {
+            let mut found = Vec::new();
+            for &index in block_of(awake, block) {
+                let at = index as usize;
+                // SAFETY: a body stands in the list once.
+                let (body, state, motion, mass) = unsafe {
+                    (bodies.get_mut(at), states.get_mut(at), motions.get_mut(at), masses.get_mut(at))
+                };
+                world.finalize_body(index, (body, state, motion, mass), &mut found);
+            }
+            if !found.is_empty() {
+                news.lock().unwrap_or_else(std::sync::PoisonError::into_inner).append(&mut found);
+            }
+        });
+    }
+
+    /// Puts a body that went non-finite back to its last finite pose and stops it.
+    fn freeze(&mut self, index: u32) {
+        let state = &mut self.solver_bodies.states[index as usize];
+        (state.linear_velocity, state.angular_velocity) = (Vec3::ZERO, Vec3::ZERO);
+        self.solver_bodies.motions[index as usize].broken = false;
+        self.bodies[index as usize].frozen = true;
+        self.refresh_solver_body(index);
+        self.clear_contacts_of(index);
+    }
+
+    /// Drops contacts past the break distance and ends arbiters that have none left and whose shapes do not overlap.
+    fn end_broken(&mut self) {
+        let mut empty = std::mem::take(&mut self.narrow.empty);
+        let may_break = std::mem::take(&mut self.scratch.may_break);
+        for (row, _) in self.plan.rows.iter().zip(&may_break).filter(|(_, may_break)| **may_break) {
+            let arbiter = self.arbiters.at_mut(row.arbiter);
+            let [pose1, pose2] = [arbiter.body1, arbiter.body2]
+                .map(|body| self.solver_bodies.masses[body.index as usize].pose());
+            arbiter.data.break_contacts(&pose1, &pose2, self.scaled.contact_break_distance);
+            if arbiter.data.usage_mask & 15 == 0 {
+                empty.push(row.arbiter);
+            }
+        }
+        self.scratch.may_break = may_break;
+        for &(_, index) in self.arbiters.order() {
+            let arbiter = self.arbiters.at(index);
+            if arbiter.alive && arbiter.pair == NONE && arbiter.data.usage_mask & 15 == 0 {
+                empty.push(index);
+            }
+        }
+        empty.sort_unstable();
+        empty.dedup();
+        for &index in &empty {
+            let arbiter = self.arbiters.at(index);
+            if !arbiter.alive || arbiter.data.usage_mask & 15 != 0 {
+                continue;
+            }
+            let pair = arbiter.pair;
+            if pair == NONE || !self.pair_overlaps(pair) {
+                self.end_arbiter(index, EndReason::Separated);
+            } else {
+                self.pairs[pair as usize].has_manifold = false;
+            }
+        }
+        empty.clear();
+        self.narrow.empty = empty;
+    }
+}
+
+/// A thread's share of the awake bodies.
+fn block_of(awake: &[u32], block: usize) -> &[u32] {
+    let start = block * BODIES_PER_BLOCK;
+    &awake[start..(start + BODIES_PER_BLOCK).min(awake.len())]
+}
+
+/// What finalizing a body reads.
+struct FinalizeContext<'a> {
+    shapes: &'a [super::shapes::ShapeSlot],
+    broad_phase: &'a crate::broad_phase::BroadPhase,
+    settings: &'a super::WorldSettings,
+    dt: Real,
+}
+
+impl FinalizeContext<'_> {
+    fn finalize_body(
+        &self,
+        index: u32,
+        (body, state, motion, mass): (
+            &mut super::bodies::Body,
+            &mut crate::solver::BodyState,
+            &mut crate::solver::BodyMotion,
+            &mut crate::solver::BodyMass,
+        ),
+        news: &mut Vec<BodyNews>,
+    ) {
+        let center = mass.center + state.translation;
+        let finite = center.is_finite()
+            && mass.rotation.is_finite()
+            && state.linear_velocity.is_finite()
+            && state.angular_velocity.is_finite();
+        if motion.broken || !finite {
+            news.push(BodyNews::Broken(index));
+            return;
+        }
+        mass.center = center;
+        let rotation = mass.rotation.to_mat3();
+        if body.is_dynamic() && !body.frozen {
+            mass.inverse_inertia = world_inverse_inertia(&rotation, motion);
+        }
+        body.pose.rotation = mass.rotation;
+        body.pose.position = center - rotation * body.mass.center;
+        let speed = state.linear_velocity.length() + state.angular_velocity.length() * body.reach;
+        let rests = if motion.kinematic { speed == 0.0 } else { body.can_sleep && speed < self.settings.sleep_speed };
+        body.sleep_time = if rests { body.sleep_time + self.dt } else { 0.0 };
+        let traveled = state.translation.length() + state.turn.length() * (body.reach - body.inner_radius);
+        if self.settings.continuous && body.continuous && !motion.kinematic && traveled > 0.5 * body.inner_radius {
+            news.push(BodyNews::Fast(index));
+        }
+        let displacement = state.linear_velocity * self.dt;
+        for &slot in &body.shape_slots {
+            self.update_box(slot, body, displacement, news);
+        }
+    }
+
+    /// Reports a shape whose box has left its fat box. Boxes of fast shapes reach ahead, so that what they will touch within
+    /// the next step is found now.
+    fn update_box(&self, slot: u32, body: &super::bodies::Body, displacement: Vec3, news: &mut Vec<BodyNews>) {
+        let shape = &self.shapes[slot as usize];
+        let tight = shape.geometry.aabb(&body.pose.mul(&shape.pose));
+        let speculative = self.settings.speculative_distance;
+        let size = shape.geometry.inner_radius();
+        let ahead = displacement.length();
+        let reach = if ahead > speculative { displacement * (min(ahead, size + speculative) / ahead) } else { Vec3::ZERO };
+        let tight = tight.sweep(reach);
+        let near = tight.expand(speculative);
+        if self.broad_phase.fat_aabb(slot).is_some_and(|fat| !fat.contains(&near)) {
+            let creep = min(0.125 * shape.geometry.local_aabb().half_extents().length(), 2.5 * speculative);
+            news.push(BodyNews::Moved { shape: slot, tight: near, fat: near.expand(creep) });
+        }
+    }
+}
