@@ -6,7 +6,10 @@ use crate::replay::{
     RecordingOptions, ShapeInstance,
 };
 use crate::report::cannot_write;
-use arbiter3d::{BodyId, ConvexHull, Quat, Shape, ShapeId, Vec3, World};
+use arbiter3d::{
+    BodyId, ConvexHull, Shape, ShapeId, World,
+    math::{Quat, Vec3},
+};
 use arbiter3d_scenes::BuiltScene;
 use std::collections::BTreeMap;
 use std::fs::OpenOptions;
@@ -131,7 +134,7 @@ impl Film {
             let (Some(body1), Some(body2)) = (index(arbiter.body1()), index(arbiter.body2())) else { continue };
             let before = self.contacts.len();
             let points = world.contact_points(arbiter);
-            self.contacts.extend(points.zip(arbiter.data().contacts()).map(|((point1, point2), (_, contact))| {
+            self.contacts.extend(points.zip(arbiter.data().contacts()).map(|((_, point1, point2), (_, contact))| {
                 ContactSample {
                     point: ((point1 + point2) * 0.5).to_array(),
                     normal: contact.normal().to_array(),

@@ -1,7 +1,10 @@
 //! What all scenes share: options, a world under construction and short verbs to fill it.
 
 use crate::{BeforeStep, BuiltScene, Random};
-use arbiter3d::{BodyDefinition, BodyId, Error, Real, Shape, ShapeDefinition, SimdLevel, Vec3, World, WorldSettings};
+use arbiter3d::{
+    BodyDefinition, BodyId, Error, Shape, ShapeDefinition, SimdLevel, World, WorldSettings,
+    math::{Real, Vec3},
+};
 
 /// How a scene is to be built. The default is the scene as published, on one thread.
 ///

@@ -29,7 +29,7 @@ pub use builder::SceneOptions;
 pub use random::Random;
 pub use registry::{SCENES, Scene, Size, find, nearest};
 
-use arbiter3d::{Error, Real, StepReport, World};
+use arbiter3d::{Error, StepReport, World, math::Real};
 
 /// What a scene does before each step: it gets the index of the step about to be taken, from zero.
 pub type BeforeStep = Box<dyn FnMut(usize, &mut World) -> Result<(), Error> + Send>;

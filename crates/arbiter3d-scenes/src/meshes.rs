@@ -2,7 +2,7 @@
 //! surfaces).
 
 use crate::turns::sin_cos;
-use arbiter3d::{Real, Vec3};
+use arbiter3d::math::{Real, Vec3};
 use std::f32::consts::{PI, TAU};
 
 /// Corners and triangles of a mesh, ready for [`arbiter3d::Shape::mesh`].

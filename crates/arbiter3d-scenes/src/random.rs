@@ -3,7 +3,7 @@
 //!
 //! `s ← s · 2147001325 + 715136305 (mod 2³²)`, and a number is the low 16 bits of `s` mapped to [−½, ½].
 
-use arbiter3d::{Quat, Real, Vec3};
+use arbiter3d::math::{Quat, Real, Vec3};
 
 /// A stream of repeatable random numbers.
 ///

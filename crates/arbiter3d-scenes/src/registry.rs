@@ -1,7 +1,7 @@
 //! The list of all scenes by name.
 
 use crate::{BuiltScene, SceneOptions, scenes};
-use arbiter3d::{Error, Real};
+use arbiter3d::{Error, math::Real};
 
 /// A scene that can be built by name.
 ///

@@ -1,7 +1,7 @@
 //! Angles and rotations with the same bits on every machine: sine and cosine come from the `libm` crate in double
 //! precision and are rounded once.
 
-use arbiter3d::{Quat, Real, Rotation, Vec3};
+use arbiter3d::math::{Quat, Real, Rotation, Vec3};
 
 /// Sine and cosine of an angle in radians.
 #[must_use]

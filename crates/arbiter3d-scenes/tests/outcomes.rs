@@ -1,6 +1,9 @@
 //! The scenes whose outcome is known do what a formula or other engines say.
 
-use arbiter3d::{BodyId, BodyKind, Rotation, Vec3, World};
+use arbiter3d::{
+    BodyId, BodyKind, World,
+    math::{Rotation, Vec3},
+};
 use arbiter3d_scenes::{BuiltScene, SceneOptions, find};
 
 fn built(name: &str) -> BuiltScene {

@@ -6,8 +6,8 @@ use super::format::{
 use super::{obj, parse};
 use crate::problem::{Place, Problem};
 use arbiter3d::{
-    BodyDefinition, BodyKind, CombineRule, Filter, LockedAxes, Material, Quat, Real, Shape, ShapeDefinition, Vec3,
-    World, WorldSettings,
+    BodyDefinition, BodyKind, CombineRule, Filter, LockedAxes, Material, Shape, ShapeDefinition, World, WorldSettings,
+    math::{Quat, Real, Vec3},
 };
 use arbiter3d_scenes::{BuiltScene, Random, SceneOptions, turns};
 use std::collections::BTreeMap;

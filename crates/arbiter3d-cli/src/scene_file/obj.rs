@@ -5,7 +5,7 @@
 
 use super::format::{MeshSpec, SidesSpec, UpAxis};
 use crate::problem::Problem;
-use arbiter3d::{MeshSides, Shape, ShapeError, TriangleMesh, Vec3};
+use arbiter3d::{MeshSides, Shape, ShapeError, TriangleMesh, math::Vec3};
 use std::path::Path;
 use std::sync::Arc;
 

@@ -3,7 +3,10 @@
 use crate::builder::Builder;
 use crate::turns::about;
 use crate::{BuiltScene, SceneOptions};
-use arbiter3d::{BodyDefinition, Error, Real, Rotation, Shape, ShapeDefinition, Vec3, WorldSettings};
+use arbiter3d::{
+    BodyDefinition, Error, Shape, ShapeDefinition, WorldSettings,
+    math::{Real, Rotation, Vec3},
+};
 
 /// Eleven boxes with friction 0, 0.1, … 1 on a frictionless slope of 30° (whose tangent is 0.577).
 pub(crate) fn ramps(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {

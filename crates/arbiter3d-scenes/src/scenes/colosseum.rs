@@ -7,7 +7,10 @@
 use crate::builder::{Builder, cuboid};
 use crate::turns::{about, sin_cos, then};
 use crate::{BuiltScene, SceneOptions};
-use arbiter3d::{BodyDefinition, Error, Real, Shape, ShapeDefinition, Vec3, World};
+use arbiter3d::{
+    BodyDefinition, Error, Shape, ShapeDefinition, World,
+    math::{Real, Vec3},
+};
 use std::f32::consts::{FRAC_PI_2, PI};
 
 /// Size of a stone, metres.

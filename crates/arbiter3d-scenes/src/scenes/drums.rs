@@ -3,7 +3,10 @@
 use crate::builder::{Builder, cuboid, plain};
 use crate::turns::sin_cos;
 use crate::{BuiltScene, SceneOptions};
-use arbiter3d::{BodyDefinition, Error, Real, Shape, ShapeDefinition, Vec3};
+use arbiter3d::{
+    BodyDefinition, Error, Shape, ShapeDefinition,
+    math::{Real, Vec3},
+};
 use std::f32::consts::PI;
 
 /// Box3D's `washer`: small cubes in a drum of 36 wedges and four paddles that turns at 25° a second.

@@ -2,7 +2,10 @@
 
 use crate::builder::{Builder, cuboid, plain};
 use crate::{BuiltScene, SceneOptions};
-use arbiter3d::{BodyDefinition, Error, Real, Shape, ShapeDefinition, Vec3, World};
+use arbiter3d::{
+    BodyDefinition, Error, Shape, ShapeDefinition, World,
+    math::{Real, Vec3},
+};
 
 /// Box3D's `large_world`: 1,000 × 1,000 static slabs of 10 m; every fifth step a ball drops somewhere else.
 pub(crate) fn large_world(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {

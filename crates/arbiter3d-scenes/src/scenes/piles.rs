@@ -4,7 +4,10 @@ use crate::builder::{Builder, Mixed, cuboid, plain};
 use crate::meshes::{fibonacci_sphere, prism, surface};
 use crate::turns::sin_cos;
 use crate::{BuiltScene, SceneOptions};
-use arbiter3d::{BodyDefinition, BodyId, Error, Real, Shape, ShapeDefinition, Vec3, World};
+use arbiter3d::{
+    BodyDefinition, BodyId, Error, Shape, ShapeDefinition, World,
+    math::{Real, Vec3},
+};
 
 /// Box3D's `convex_pile`: 8 × 8 rocks a layer, all with the hull of the same 32 random points on a sphere of 2 m.
 pub(crate) fn convex_pile(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {

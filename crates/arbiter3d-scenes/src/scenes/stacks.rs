@@ -3,7 +3,10 @@
 use crate::builder::{Builder, cuboid};
 use crate::turns::about;
 use crate::{BuiltScene, SceneOptions};
-use arbiter3d::{BodyDefinition, Error, Quat, Real, Rotation, Shape, ShapeDefinition, Vec3};
+use arbiter3d::{
+    BodyDefinition, Error, Shape, ShapeDefinition,
+    math::{Quat, Real, Rotation, Vec3},
+};
 use std::f32::consts::TAU;
 
 /// Centres of an upright triangle of unit cubes that touch their neighbours, the bottom row centred at x = 0.

@@ -1,7 +1,7 @@
 //! Each scene has the bodies that its description promises.
 
 use crate::{BuiltScene, SceneOptions, find};
-use arbiter3d::{BodyId, BodyKind, Real, World};
+use arbiter3d::{BodyId, BodyKind, World, math::Real};
 
 fn built(name: &str, size: Option<usize>) -> BuiltScene {
     find(name).unwrap().build(&SceneOptions { size, ..SceneOptions::default() }).unwrap()

@@ -3,7 +3,10 @@
 use crate::builder::{Builder, plain};
 use crate::meshes::{prism, wave};
 use crate::{BuiltScene, SceneOptions};
-use arbiter3d::{BodyDefinition, Error, Real, Shape, ShapeDefinition, Vec3, WorldSettings};
+use arbiter3d::{
+    BodyDefinition, Error, Shape, ShapeDefinition, WorldSettings,
+    math::{Real, Vec3},
+};
 
 /// Cells of 1 m.
 pub(crate) fn trees100(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
