@@ -1,6 +1,5 @@
 // What the replay page needs of three.js. README.md says how this becomes three.bundle.js.
 export {
-  AmbientLight,
   BoxGeometry,
   BufferAttribute,
   BufferGeometry,
@@ -11,7 +10,6 @@ export {
   DynamicDrawUsage,
   Fog,
   HemisphereLight,
-  IcosahedronGeometry,
   InstancedBufferAttribute,
   InstancedMesh,
   LineBasicMaterial,
@@ -23,6 +21,7 @@ export {
   PointsMaterial,
   Raycaster,
   Scene,
+  SphereGeometry,
   Vector2,
   Vector3,
   WebGLRenderer,

@@ -216,6 +216,37 @@ fn write_mixed(path: &Path) -> serde_json::Value {
     })
 }
 
+/// 27 balls in a closed box that turns with them: one frame a degree.
+fn write_drum(path: &Path) -> serde_json::Value {
+    let mut recording = Recording::new(RecordingOptions::new("drum", 1.0 / 30.0));
+    let drum = recording.add_body(BodyInfo { kind: BodyKind::Kinematic, name: Some("drum".into()) });
+    for wall in 0..6 {
+        let (mut half_extents, mut position) = ([3.0; 3], [0.0; 3]);
+        half_extents[wall / 2] = 0.1;
+        position[wall / 2] = if wall % 2 == 0 { 3.1 } else { -3.1 };
+        let geometry = recording.add_geometry(Geometry::Cuboid { half_extents }).unwrap();
+        recording.add_shape(ShapeInstance { body: drum, geometry, position, rotation: IDENTITY }).unwrap();
+    }
+    let geometry = recording.add_geometry(Geometry::Sphere { radius: 0.7 }).unwrap();
+    for _ in 0..27 {
+        let body = recording.add_body(BodyInfo { kind: BodyKind::Dynamic, name: None });
+        recording.add_shape(ShapeInstance { body, geometry, position: [0.0; 3], rotation: IDENTITY }).unwrap();
+    }
+    for step in 0..30 {
+        let half = (step as f32).to_radians() / 2.0;
+        let (sine, cosine) = (libm::sinf(2.0 * half), libm::cosf(2.0 * half));
+        let rotation = [0.0, 0.0, libm::sinf(half), libm::cosf(half)];
+        let ball = |i: usize| {
+            let [x, y, z] = [i % 3, i / 3 % 3, i / 9].map(|cell| 2.0 * (cell as f32 - 1.0));
+            BodySample::at([cosine * x - sine * y, sine * x + cosine * y, z], rotation)
+        };
+        let bodies: Vec<_> = std::iter::once(BodySample::at([0.0; 3], rotation)).chain((0..27).map(ball)).collect();
+        push(&mut recording, step, &bodies, &[]);
+    }
+    recording.write_html(path).unwrap();
+    serde_json::json!({ "container": "drum" })
+}
+
 /// As many boxes and contacts as the colosseum, 60 frames a second; with bounces, all of them move all the time.
 fn write_storm(path: &Path, frames: usize, bounce: f32) -> PageStatistics {
     let mut recording = Recording::new(RecordingOptions::new("storm of 8,818 boxes", 1.0 / 60.0));
@@ -280,6 +311,14 @@ fn browse(arguments: &[&Path]) -> bool {
 fn the_page_shows_in_a_browser_what_was_recorded() {
     let (page, expected) = (temporary("mixed.html"), temporary("mixed.json"));
     let facts = write_mixed(&page);
+    std::fs::write(&expected, facts.to_string()).unwrap();
+    browse(&[&page, &expected]);
+}
+
+#[test]
+fn a_closed_container_does_not_hide_what_is_in_it() {
+    let (page, expected) = (temporary("drum.html"), temporary("drum.json"));
+    let facts = write_drum(&page);
     std::fs::write(&expected, facts.to_string()).unwrap();
     browse(&[&page, &expected]);
 }

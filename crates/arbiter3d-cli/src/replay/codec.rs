@@ -8,8 +8,10 @@
 //!
 //! The layout of one frame, in variable-length integers (seven bits a byte, low first; signed ones zigzag-coded):
 //!
-//!     states, islands:  count, index gaps[count], differences[count]
-//!     poses:            count, index gaps[count], then seven columns of errors[count]: x y z, qx qy qz qw
+//! ```text
+//! states, islands:  count, index gaps[count], differences[count]
+//! poses:            count, index gaps[count], then seven columns of errors[count]: x y z, qx qy qz qw
+//! ```
 //!
 //! A chunk starts from zero: its first frame is complete, and after it every body is predicted to stand still.
 //! All arithmetic wraps, here and in the page, so that absurd coordinates give absurd pictures and not errors.
@@ -238,16 +240,16 @@ pub(super) mod tests {
             for index in reader.indices() {
                 bodies[index].island += reader.signed();
             }
-            let mut errors = vec![[0_i32; 7]; count];
+            let mut errors = vec![vec![0_i32; count]; COMPONENTS];
             let missed = reader.indices();
-            for component in 0..7 {
+            for column in &mut errors {
                 for &index in &missed {
-                    errors[index][component] = reader.signed();
+                    column[index] = reader.signed();
                 }
             }
             for index in 0..count {
                 for component in 0..7 {
-                    let change = velocity[index][component].wrapping_add(errors[index][component]);
+                    let change = velocity[index][component].wrapping_add(errors[component][index]);
                     let number = &mut bodies[index].pose[component];
                     *number = number.wrapping_add(change);
                     velocity[index][component] = if frame == 0 { 0 } else { change };

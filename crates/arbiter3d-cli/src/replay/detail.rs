@@ -7,15 +7,17 @@
 //!
 //! The layout of a sample, a column after another (integers as in `codec`):
 //!
-//!     arbiter count
-//!     key 1, key 2          difference to the arbiter before, signed 64 bit
-//!     body 1, body 2        difference to the arbiter before
-//!     friction              four planes of bytes of the f32, high byte first
-//!     contacts an arbiter   one byte each
-//!     contact count
-//!     x, y, z               difference to the contact before, in detail steps
-//!     normal x, y, z        one byte each, 127 = 1
-//!     normal impulse        the three high bytes of the f32, as planes, rounded to 12 bits of precision
+//! ```text
+//! arbiter count
+//! key 1, key 2          difference to the arbiter before, signed 64 bit
+//! body 1, body 2        difference to the arbiter before
+//! friction              four planes of bytes of the f32, high byte first
+//! contacts an arbiter   one byte each
+//! contact count
+//! x, y, z               difference to the contact before, in detail steps
+//! normal x, y, z        one byte each, 127 = 1
+//! normal impulse        the three high bytes of the f32, as planes, rounded to 12 bits of precision
+//! ```
 
 use super::codec::{compress, quantise, write_signed, write_unsigned};
 use super::recording::ContactDetail;

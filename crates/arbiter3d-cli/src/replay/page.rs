@@ -15,7 +15,9 @@ use std::path::Path;
 
 const TEMPLATE: &str = include_str!("../../page/template.html");
 const STYLE: &str = include_str!("../../page/replay.css");
-const SCRIPT: &str = include_str!("../../page/replay.js");
+/// In the order in which they need each other; they become one script.
+const SCRIPTS: [&str; 3] =
+    [include_str!("../../page/data.js"), include_str!("../../page/stage.js"), include_str!("../../page/replay.js")];
 const THREE: &str = include_str!("../../page/three.bundle.js");
 const THREE_LICENSE: &str = include_str!("../../page/THREE-LICENSE");
 
@@ -101,7 +103,7 @@ impl Recording {
         match name {
             "title" => output.write_all(escape(&self.options.title).as_bytes()),
             "style" => output.write_all(STYLE.as_bytes()),
-            "script" => output.write_all(SCRIPT.as_bytes()),
+            "script" => output.write_all(SCRIPTS.concat().as_bytes()),
             "three" => output.write_all(THREE.as_bytes()),
             "three_license" => output.write_all(THREE_LICENSE.trim().as_bytes()),
             "scene" => self.write_scene(output),
@@ -210,7 +212,7 @@ mod tests {
 
     #[test]
     fn no_inlined_script_can_end_its_element() {
-        for script in [SCRIPT, THREE] {
+        for script in SCRIPTS.into_iter().chain([THREE]) {
             assert!(!script.to_ascii_lowercase().contains("</script"));
             assert!(!script.contains("<!--"));
         }
