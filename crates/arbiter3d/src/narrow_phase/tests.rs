@@ -652,10 +652,7 @@ fn the_deepest_corner_is_in_the_manifold() {
     let mut random = Random(77);
     let corner = |x: Real, z: Real| Vec3::new(50.0 * x, 50.0, 50.0 * z);
     let square = vec![corner(-1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0), corner(1.0, -1.0)];
-    let grounds = [
-        Shape::cuboid(Vec3::splat(50.0)).unwrap(),
-        Shape::mesh(square, vec![[0, 1, 2], [0, 2, 3]]).unwrap(),
-    ];
+    let grounds = [Shape::cuboid(Vec3::splat(50.0)).unwrap(), Shape::mesh(square, vec![[0, 1, 2], [0, 2, 3]]).unwrap()];
     // A prism whose side is bent by a third of a degree, and rocks.
     let bent = [(0.5, -0.35, 0.0), (-0.25, -0.35, 0.43), (-0.25, -0.35, -0.43), (0.3, 0.4, 0.0), (-0.15, 0.4, 0.26)];
     let mut hulls = vec![Shape::hull(&bent.map(|(x, y, z)| Vec3::new(x, y, z))).unwrap()];
