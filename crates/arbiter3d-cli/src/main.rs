@@ -1,3 +1,7 @@
 //! The `arbiter3d` command.
 
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    arbiter3d_cli::main_with(std::env::args_os())
+}

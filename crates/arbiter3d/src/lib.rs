@@ -42,8 +42,8 @@ pub use shape::{
 };
 pub use simd::{SimdLevel, UnknownSimdLevel};
 pub use world::{
-    BeginEvent, BeginListener, BodyDefinition, BodyId, BodyKind, BodyMut, BodyRef, CombineRule, ContactProvider,
-    EndEvent, EndListener, Error, Filter, LockedAxes, Material, Phase, QueryFilter, RayHit, SensorEvent,
-    ShapeDefinition, ShapeId, ShapeMut, ShapeRef, StepContext, StepReport, Timings, UNIT_TOLERANCE, World,
-    WorldSettings,
+    BeginEvent, BeginListener, BodyDefinition, BodyId, BodyKind, BodyMut, BodyRef, CombineRule, ContactFilter,
+    ContactProvider, EndEvent, EndListener, Error, Filter, LockedAxes, Material, PairFilter, Phase, QueryFilter,
+    RayHit, SensorEvent, ShapeDefinition, ShapeId, ShapeMut, ShapePair, ShapeRef, StepContext, StepReport, Timings,
+    UNIT_TOLERANCE, World, WorldSettings,
 };

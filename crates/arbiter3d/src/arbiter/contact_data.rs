@@ -124,8 +124,8 @@ impl Contact {
 /// }));
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(C)] // what is shared comes first: colouring reads that alone
 pub struct ContactData {
-    pub(crate) slots: [Contact; SLOTS],
     pub(crate) usage_mask: u8,
     pub(crate) solve_mode: SolveMode,
     pub(crate) flags: u8,
@@ -135,6 +135,7 @@ pub struct ContactData {
     /// Surface velocity of body 2 against body 1, world axes.
     pub(crate) tangent_velocity: Vec3,
     pub(crate) rolling_impulse: Vec3,
+    pub(crate) slots: [Contact; SLOTS],
 }
 
 /// The user has set the friction: materials no longer reach it.
@@ -145,6 +146,8 @@ pub(crate) const RESTITUTION_OVERRIDDEN: u8 = 2;
 pub(crate) const TANGENT_VELOCITY_OVERRIDDEN: u8 = 4;
 /// The user has set the rolling resistance.
 pub(crate) const ROLLING_OVERRIDDEN: u8 = 8;
+/// All contacts have the bit-equal normal and nothing removed: one row holds them all.
+pub(crate) const ONE_NORMAL: u8 = 16;
 
 impl ContactData {
     /// Bits 0 to 3: the slot holds a contact. Bits 4 to 7: the slot was solved in the last step.
@@ -255,6 +258,7 @@ impl ContactData {
         contact.normal = normal;
         contact.world_normal = true;
         contact.tangent_impulse -= normal * normal.dot(contact.tangent_impulse);
+        self.flags &= !ONE_NORMAL;
         Ok(())
     }
 

@@ -66,8 +66,8 @@ pub enum EndReason {
 /// # Ok::<(), arbiter3d::Error>(())
 /// ```
 #[derive(Clone, Debug)]
+#[repr(C, align(64))] // names and links fill the first cache line, the contact data follow
 pub struct Arbiter {
-    pub(crate) data: ContactData,
     pub(crate) key: ArbiterKey,
     pub(crate) body1: BodyId,
     pub(crate) body2: BodyId,
@@ -82,6 +82,7 @@ pub struct Arbiter {
     /// Neighbours in the lists of body 1 and body 2, as `index * 2 + side`.
     next: [u32; 2],
     previous: [u32; 2],
+    pub(crate) data: ContactData,
 }
 
 impl Arbiter {
@@ -112,11 +113,7 @@ impl Arbiter {
     /// The other body; `None` when `body` is neither.
     #[must_use]
     pub fn other_body(&self, body: BodyId) -> Option<BodyId> {
-        if body == self.body1 {
-            Some(self.body2)
-        } else {
-            (body == self.body2).then_some(self.body1)
-        }
+        if body == self.body1 { Some(self.body2) } else { (body == self.body2).then_some(self.body1) }
     }
 
     /// Whether the engine made it for two shapes, rather than a user.
@@ -173,6 +170,8 @@ pub(crate) struct ArbiterStore {
     /// Live arbiters of awake bodies: `sorted` in key order, `fresh` not merged yet.
     sorted: Vec<(ArbiterKey, u32)>,
     fresh: Vec<(ArbiterKey, u32)>,
+    /// Live arbiters that users made.
+    pub custom: u32,
     merged: Vec<(ArbiterKey, u32)>,
     stale: bool,
 }

@@ -548,3 +548,33 @@ fn extreme_numbers_are_survived() {
         assert!(manifold.points().is_empty());
     }
 }
+
+/// Tiles of unlike size, whose corners lie amid the neighbours' edges, are one floor.
+#[test]
+fn unlike_tiles_make_one_floor() {
+    let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+    for (start, size, count) in [(-4.0, 4.0, 2), (0.0, 0.7, 12)] {
+        for tile in 0..count * count {
+            let (i, j) = ((tile % count) as Real, (tile / count) as Real);
+            let low = Vec3::new(start + i * size, 0.0, -4.0 + j * size);
+            if size == 4.0 && i > 0.0 {
+                continue;
+            }
+            let first = vertices.len() as u32;
+            vertices.extend([low, low + Vec3::Z * size, low + Vec3::X * size, low + (Vec3::X + Vec3::Z) * size]);
+            triangles.extend([[first, first + 1, first + 2], [first + 2, first + 1, first + 3]]);
+        }
+    }
+    let mesh = TriangleMesh::new(vertices, triangles).unwrap();
+    let mut random = Random(71);
+    for shape in some_shapes().unwrap() {
+        for _ in 0..500 {
+            let turn = random.rotation();
+            let mut pose = Pose::new(Vec3::new(0.5 * random.next(), 0.0, 2.0 * random.next()), turn);
+            pose.position.y = -lowest(&shape, &pose) - 0.005;
+            let manifold = touch(&mesh, &shape, &pose);
+            assert!(manifold.points().iter().all(|p| p.normal == Vec3::Y), "{shape:?} {pose:?} {manifold:?}");
+            assert!(manifold.points().iter().any(|p| (p.separation + 0.005).abs() < 1e-5));
+        }
+    }
+}

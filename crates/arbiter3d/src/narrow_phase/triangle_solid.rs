@@ -168,8 +168,8 @@ impl Pair<'_> {
             separation <= self.reach.margin
         };
         for (face, plane) in self.solid.planes.iter().enumerate() {
-            let [a, b, c] = self.triangle.corners.map(|corner| plane.normal.dot(corner) - plane.offset);
-            if !offer(Axis::Face { face }, -plane.normal, min(a, min(b, c))) {
+            let above = |i: usize| plane.normal.dot(self.triangle.corners[i]) - plane.offset;
+            if !offer(Axis::Face { face }, -plane.normal, min(above(0), min(above(1), above(2)))) {
                 return None;
             }
         }
@@ -261,7 +261,8 @@ impl Pair<'_> {
         let first = self.solid.edge_points(self.solid.face_edges[face] as usize).0;
         let mut end = triangle.insides(first);
         // Corners amid a flat surface are no ends of the contact.
-        let mut under = [0, 1, 2].map(|i| !(seams && triangle.facet.flat_corners >> i & 1 == 1));
+        let bent = |i: usize| !(seams && triangle.facet.flat_corners >> i & 1 == 1);
+        let mut under = [bent(0), bent(1), bent(2)];
         let any = under != [false; 3];
         for edge in self.solid.face_loop(face) {
             let (a, b) = self.solid.edge_points(edge);

@@ -138,6 +138,10 @@ impl TriangleMesh {
         let boxes: Vec<Aabb> = triangles.iter().map(|t| Aabb::from_points(corners(t))).collect();
         let (tree, order) = MeshTree::build(&boxes);
         let mut adjacency = Adjacency::new(&vertices, &triangles, normals);
+        adjacency.close_seams(&vertices, &triangles, normals, |point, gap, visit| {
+            tree.query(&Aabb::from_center(point, Vec3::splat(gap)), |slot| visit(order[slot]));
+        });
+        adjacency.mark_corners();
         let facet = |&id: &u32| {
             let neighborhood = &adjacency.triangles[id as usize];
             let bits = |bit: &dyn Fn(usize) -> bool| (0..3).map(|i| u8::from(bit(i)) << i).sum();

@@ -5,7 +5,8 @@
 //! direction `u` that leads from the edge into the neighbour, and a corner those with `n · d ≤ 0` for every edge `d` that
 //! leaves it. Flat and concave edges allow no normal of their own, so that seams inside a surface are never felt.
 //!
-//! Corners are joined by position, so triangles that share no indices are neighbours all the same. Where more than two
+//! Corners are joined by position, so triangles that share no indices are neighbours all the same, and an open edge that
+//! runs along another triangle (a T-junction) is a seam with that one. Where more than two
 //! triangles meet at an edge, the neighbour that closes most of the front side counts.
 
 use crate::math::{Real, Vec3};
@@ -27,6 +28,9 @@ pub enum MeshEdge {
 /// Below this sine of the angle between two neighbours their edge is flat. Only the cost depends on it: steeper edges
 /// are tested against the normals they allow, flat ones need no test.
 const FLAT_SINE: Real = 1e-3;
+
+/// An open edge is closed by a triangle no farther from its middle than this share of its length.
+const SEAM_GAP: Real = 1e-4;
 
 /// The neighbourhood of one triangle.
 #[derive(Clone, Copy, Debug, Default)]
@@ -80,7 +84,6 @@ impl Adjacency {
             }
         }
         adjacency.link_corners(vertices.len(), &sides);
-        adjacency.flatten_patches();
         adjacency
     }
 
@@ -125,10 +128,62 @@ impl Adjacency {
                 self.join_patches(side.2, other);
             }
         }
-        for corner in [side.0 as usize, side.1 as usize] {
-            self.sharp[corner] |= matches!(kind, MeshEdge::Boundary | MeshEdge::Convex);
-            self.bent[corner] |= kind != MeshEdge::Flat;
+    }
+
+    /// Closes the open edges that run along another triangle without sharing its corners (T-junctions): `near` calls back
+    /// with the triangles around a point. The middle of the edge decides for all of it.
+    pub(super) fn close_seams(
+        &mut self,
+        vertices: &[Vec3],
+        triangles: &[[u32; 3]],
+        normals: &[Vec3],
+        near: impl Fn(Vec3, Real, &mut dyn FnMut(u32)),
+    ) {
+        for index in 0..triangles.len() {
+            for edge in 0..3 {
+                if self.triangles[index].kinds[edge] != MeshEdge::Boundary {
+                    continue;
+                }
+                let corner = |t: usize, i: usize| vertices[triangles[t][i % 3] as usize];
+                let (a, b) = (corner(index, edge), corner(index, edge + 1));
+                let (middle, along) = ((a + b) * 0.5, (b - a).normalize_or_zero());
+                let gap = SEAM_GAP * (b - a).length();
+                let side = (0, 0, index as u32, edge as u32);
+                let mut others = Vec::new();
+                near(middle, gap, &mut |other| {
+                    // Away from the edge inside the other triangle, if that goes on from the middle.
+                    let across = normals[other as usize].cross(along).normalize_or_zero();
+                    let goes_on = |u: Vec3| {
+                        (0..3).all(|i| {
+                            let start = corner(other as usize, i);
+                            let inward = normals[other as usize].cross(corner(other as usize, i + 1) - start);
+                            inward.dot(middle + u * (3.0 * gap) - start) >= -gap * inward.length()
+                        })
+                    };
+                    let plane = normals[other as usize].dot(middle - corner(other as usize, 0)).abs();
+                    if other != index as u32 && plane <= gap && across != Vec3::ZERO {
+                        others.extend([across, -across].into_iter().filter(|u| goes_on(*u)).map(|u| (other, u)));
+                    }
+                });
+                let own = self.triangles[index].own[edge];
+                // What folds back onto the triangle itself is a second sheet, not its continuation.
+                let ahead = others.into_iter().filter(|(_, u)| u.dot(own) < 0.99);
+                self.join(&side, normals[index], own, ahead);
+            }
         }
+    }
+
+    /// Marks the corners in which edges end that are not flat. Call once all edges are known.
+    pub(super) fn mark_corners(&mut self) {
+        for triangle in &self.triangles {
+            for (edge, kind) in triangle.kinds.iter().enumerate() {
+                for corner in [triangle.corners[edge], triangle.corners[(edge + 1) % 3]] {
+                    self.sharp[corner as usize] |= matches!(kind, MeshEdge::Boundary | MeshEdge::Convex);
+                    self.bent[corner as usize] |= *kind != MeshEdge::Flat;
+                }
+            }
+        }
+        self.flatten_patches();
     }
 
     fn patch(&mut self, triangle: u32) -> u32 {

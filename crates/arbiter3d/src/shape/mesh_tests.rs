@@ -163,3 +163,19 @@ fn three_triangles_at_an_edge_close_the_front() {
         }
     }
 }
+
+/// A long edge that meets two short ones, without a corner where they meet: flat all the same, from both sides.
+#[test]
+fn seams_without_shared_corners_are_closed() {
+    let at = |x: Real, z: Real| Vec3::new(x, 0.0, z);
+    let vertices = vec![at(0.0, 0.0), at(0.0, 2.0), at(2.0, 0.0), at(-1.0, 0.0), at(0.0, 1.3), at(-1.0, 2.0)];
+    let mesh = TriangleMesh::new(vertices, vec![[0, 1, 2], [0, 3, 4], [4, 5, 1]]).unwrap();
+    for i in 0..3 {
+        let facet = mesh.facet(i);
+        for edge in 0..3 {
+            let seam = facet.corners[edge].x == 0.0 && facet.corners[(edge + 1) % 3].x == 0.0;
+            let expected = if seam { MeshEdge::Flat } else { MeshEdge::Boundary };
+            assert_eq!(mesh.neighborhood(i).kinds[edge], expected, "triangle {} edge {edge}", facet.id);
+        }
+    }
+}

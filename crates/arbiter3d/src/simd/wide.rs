@@ -131,11 +131,7 @@ impl<const L: usize> WideVec3<L> {
 
     #[inline(always)]
     pub fn cross(&self, o: &Self) -> Self {
-        Self {
-            x: self.y * o.z - self.z * o.y,
-            y: self.z * o.x - self.x * o.z,
-            z: self.x * o.y - self.y * o.x,
-        }
+        Self { x: self.y * o.z - self.z * o.y, y: self.z * o.x - self.x * o.z, z: self.x * o.y - self.y * o.x }
     }
 
     #[inline(always)]

@@ -24,7 +24,9 @@ pub(crate) struct BodyState {
     pub turn: Vec3,
     /// Whether a row acts on the body in this step.
     pub constrained: u32,
-    unused: [u32; 3],
+    /// Whether contacts can move the body at all: dynamic, enabled, not locked on all axes.
+    pub moves: u32,
+    unused: [u32; 2],
 }
 
 impl Default for BodyState {
@@ -35,7 +37,8 @@ impl Default for BodyState {
             translation: Vec3::ZERO,
             turn: Vec3::ZERO,
             constrained: 0,
-            unused: [0; 3],
+            moves: 0,
+            unused: [0; 2],
         }
     }
 }
@@ -203,11 +206,7 @@ pub(crate) unsafe fn gather<const L: usize>(
 /// # Safety
 /// No other thread may touch the bodies without [`READ_ONLY`].
 #[inline(always)]
-pub(crate) unsafe fn scatter<const L: usize>(
-    states: &SharedStates<'_>,
-    bodies: &[u32; L],
-    velocity: &WideVelocity<L>,
-) {
+pub(crate) unsafe fn scatter<const L: usize>(states: &SharedStates<'_>, bodies: &[u32; L], velocity: &WideVelocity<L>) {
     for lane in 0..L {
         if bodies[lane] & READ_ONLY == 0 {
             // SAFETY: promised by the caller; the reference ends with this iteration.

@@ -10,7 +10,7 @@
 //! how they came about.
 
 use super::bodies::SolverBodies;
-use crate::arbiter::{Arbiter, ArbiterKey, SLOTS};
+use crate::arbiter::{Arbiter, ArbiterKey, ONE_NORMAL, SLOTS};
 
 /// Colours for rows between two dynamic bodies.
 const DYNAMIC_COLORS: usize = 64;
@@ -89,6 +89,12 @@ impl RowPlan {
     /// Splits an arbiter into groups of equal normal and mode; each is a row.
     fn add_rows(&mut self, index: u32, arbiter: &Arbiter, bodies: &mut SolverBodies) {
         let data = &arbiter.data;
+        if data.flags & ONE_NORMAL != 0 {
+            let slots = data.usage_mask & 15;
+            let (color, class) = (self.color(arbiter, bodies), class_of(slots));
+            self.unsorted.push(RowSource { arbiter: index, slots, first: true, color, class });
+            return;
+        }
         let mut left = data.usage_mask & 15;
         let mut first = true;
         while left != 0 {
@@ -116,11 +122,7 @@ impl RowPlan {
 
     fn color(&mut self, arbiter: &Arbiter, bodies: &mut SolverBodies) -> u8 {
         let (a, b) = (arbiter.body1.index as usize, arbiter.body2.index as usize);
-        let moves = |body: usize| {
-            let mass = &bodies.masses[body];
-            mass.inverse_mass != crate::math::Vec3::ZERO || mass.inverse_inertia.xx + mass.inverse_inertia.yy + mass.inverse_inertia.zz > 0.0
-        };
-        let (a_moves, b_moves) = (moves(a), moves(b));
+        let (a_moves, b_moves) = (bodies.states[a].moves != 0, bodies.states[b].moves != 0);
         bodies.states[a].constrained = 1;
         bodies.states[b].constrained = 1;
         if a_moves && b_moves {

@@ -30,7 +30,14 @@ pub(crate) trait ContactSolver: Send + Sync {
     fn prepare(&mut self, plan: &RowPlan, context: &PrepareContext<'_>, pool: &mut StagePool);
 
     /// Runs a pass over one group of the plan.
-    fn pass(&mut self, group: usize, pass: Pass, states: &mut [BodyState], parameters: &PassParameters, pool: &mut StagePool);
+    fn pass(
+        &mut self,
+        group: usize,
+        pass: Pass,
+        states: &mut [BodyState],
+        parameters: &PassParameters,
+        pool: &mut StagePool,
+    );
 
     /// Writes impulses and gaps back to the arbiters; notes in `may_break` (by row of the plan) whose contacts to test.
     fn store(&mut self, target: StoreTarget<'_>, pool: &mut StagePool);

@@ -78,9 +78,9 @@ fn gather_bodies<const L: usize, const P: usize, const C: usize>(
     let (m1, m2) = (&context.bodies.masses[b1 as usize], &context.bodies.masses[b2 as usize]);
     let lead = &arbiter.data.slots[source.slots.trailing_zeros() as usize];
     let mode = arbiter.data.solve_mode & !lead.remove;
-    let moves = |m: &super::bodies::BodyMass| m.inverse_mass != Vec3::ZERO || m.inverse_inertia.xx + m.inverse_inertia.yy + m.inverse_inertia.zz > 0.0;
-    row.body1[lane] = if moves(m1) { b1 } else { b1 | READ_ONLY };
-    row.body2[lane] = if moves(m2) { b2 } else { b2 | READ_ONLY };
+    let read_only = |body: u32| if context.bodies.states[body as usize].moves != 0 { body } else { body | READ_ONLY };
+    row.body1[lane] = read_only(b1);
+    row.body2[lane] = read_only(b2);
     let normal = if lead.world_normal { lead.normal } else { m1.rotation.rotate(lead.local_normal) };
     row.normal.set(lane, normal);
     gathered.between.set(lane, m2.center - m1.center);
@@ -293,8 +293,8 @@ fn prepare_restitution<const L: usize, const P: usize, const C: usize>(
         let acceleration = n.dot(bodies.motions[b2].acceleration - bodies.motions[b1].acceleration);
         for i in 0..P {
             let point = &row.points[i];
-            let speed = linear + point.arm2.get(lane).dot(s2.angular_velocity)
-                - point.arm1.get(lane).dot(s1.angular_velocity);
+            let speed =
+                linear + point.arm2.get(lane).dot(s2.angular_velocity) - point.arm1.get(lane).dot(s1.angular_velocity);
             let squared = speed * speed - 2.0 * acceleration * point.separation[lane];
             friction.approach[i][lane] =
                 if speed < 0.0 && squared > 0.0 { -squared.sqrt() } else { crate::math::min(speed, 0.0) };
@@ -343,7 +343,7 @@ pub(crate) fn store_lane<const L: usize, const P: usize, const C: usize>(
         let impulse = row.impulses[point][lane];
         contact.normal = n;
         contact.normal_impulse = impulse;
-        contact.total_impulse = row.totals[point][lane];
+        contact.total_impulse = friction.totals[point][lane];
         contact.tangent_impulse = tangential * (impulse * share);
         contact.twist_impulse = friction.twist_impulse[lane] * (impulse * share);
         let gap = normal_point.separation[lane] + approach + normal_point.arm2.get(lane).dot(s2.turn)

@@ -40,8 +40,6 @@ pub(crate) struct NormalRow<const L: usize, const P: usize, const C: usize> {
     pub coupling: [Wide<L>; C],
     /// Accumulated impulses of this substep.
     pub impulses: [Wide<L>; P],
-    /// Sum of the impulses over the substeps done.
-    pub totals: [Wide<L>; P],
 }
 
 /// Friction, rolling resistance and restitution of `L` manifolds.
@@ -69,6 +67,11 @@ pub(crate) struct FrictionRow<const L: usize, const P: usize> {
     pub impulse1: Wide<L>,
     pub impulse2: Wide<L>,
     pub twist_impulse: Wide<L>,
+    /// Sum of the normal impulses over the substeps done.
+    pub totals: [Wide<L>; P],
+    pub has_rolling: bool,
+    pub has_restitution: bool,
+    // From here on read by few rows, or once a step.
     pub rolling_resistance: Wide<L>,
     pub rolling_impulse: WideVec3<L>,
     pub restitution: Wide<L>,
@@ -76,8 +79,6 @@ pub(crate) struct FrictionRow<const L: usize, const P: usize> {
     pub approach: [Wide<L>; P],
     /// Largest tangential drift of a cached contact when the step began.
     pub drift: Wide<L>,
-    pub has_rolling: bool,
-    pub has_restitution: bool,
 }
 
 impl<const L: usize, const P: usize, const C: usize> NormalRow<L, P, C> {
@@ -90,15 +91,10 @@ impl<const L: usize, const P: usize, const C: usize> NormalRow<L, P, C> {
         inverse_mass2: WideVec3::ZERO,
         inverse_inertia1: WideSymmetric::ZERO,
         inverse_inertia2: WideSymmetric::ZERO,
-        points: [NormalPoint {
-            arm1: WideVec3::ZERO,
-            arm2: WideVec3::ZERO,
-            separation: Wide::ZERO,
-            mass: Wide::ZERO,
-        }; P],
+        points: [NormalPoint { arm1: WideVec3::ZERO, arm2: WideVec3::ZERO, separation: Wide::ZERO, mass: Wide::ZERO };
+            P],
         coupling: [Wide::ZERO; C],
         impulses: [Wide::ZERO; P],
-        totals: [Wide::ZERO; P],
     };
 }
 
@@ -122,6 +118,7 @@ impl<const L: usize, const P: usize> FrictionRow<L, P> {
         impulse1: Wide::ZERO,
         impulse2: Wide::ZERO,
         twist_impulse: Wide::ZERO,
+        totals: [Wide::ZERO; P],
         rolling_resistance: Wide::ZERO,
         rolling_impulse: WideVec3::ZERO,
         restitution: Wide::ZERO,

@@ -127,7 +127,7 @@ pub(crate) unsafe fn relax<const L: usize, const P: usize, const C: usize>(
     let mut load = Wide::ZERO;
     let mut twist_load = Wide::ZERO;
     for i in 0..P {
-        row.totals[i] += row.impulses[i];
+        friction.totals[i] += row.impulses[i];
         load += row.impulses[i];
         twist_load += row.impulses[i] * friction.levers[i];
     }
@@ -149,7 +149,7 @@ pub(crate) unsafe fn relax<const L: usize, const P: usize, const C: usize>(
 #[inline(always)]
 pub(crate) unsafe fn restitute<const L: usize, const P: usize, const C: usize>(
     row: &mut NormalRow<L, P, C>,
-    friction: &FrictionRow<L, P>,
+    friction: &mut FrictionRow<L, P>,
     states: &SharedStates<'_>,
     pass: &PassParameters,
 ) {
@@ -169,11 +169,11 @@ pub(crate) unsafe fn restitute<const L: usize, const P: usize, const C: usize>(
         let old = row.impulses[i];
         let wanted = (old - row.points[i].mass * (velocities[i] + target)).max(Wide::ZERO);
         // Bounces only what hit: closing fast enough, and pressed within this step.
-        let bounces = (threshold - friction.approach[i]).if_positive(row.totals[i], Wide::ZERO);
+        let bounces = (threshold - friction.approach[i]).if_positive(friction.totals[i], Wide::ZERO);
         let new = (bounces * friction.restitution).if_positive(wanted, old);
         let delta = new - old;
         row.impulses[i] = new;
-        row.totals[i] += delta;
+        friction.totals[i] += delta;
         for later in &mut velocities[i + 1..] {
             *later += row.coupling[pair] * delta;
             pair += 1;
@@ -195,9 +195,7 @@ fn normal_velocities<const L: usize, const P: usize, const C: usize>(
     v2: &WideVelocity<L>,
 ) -> [Wide<L>; P] {
     let linear = row.normal.dot(&(v2.linear - v1.linear));
-    std::array::from_fn(|i| {
-        linear + row.points[i].arm2.dot(&v2.angular) - row.points[i].arm1.dot(&v1.angular)
-    })
+    std::array::from_fn(|i| linear + row.points[i].arm2.dot(&v2.angular) - row.points[i].arm1.dot(&v1.angular))
 }
 
 /// One Gauss–Seidel sweep over the points of a row.

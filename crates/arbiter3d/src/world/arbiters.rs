@@ -45,7 +45,8 @@ impl World {
 
     /// World points of an arbiter's contacts: slot, point on body 1, point on body 2.
     pub fn contact_points<'a>(&'a self, arbiter: &'a Arbiter) -> impl Iterator<Item = (usize, Vec3, Vec3)> + 'a {
-        let pose = |body: BodyId| self.solver_bodies.masses.get(body.index as usize).copied().unwrap_or_default().pose();
+        let pose =
+            |body: BodyId| self.solver_bodies.masses.get(body.index as usize).copied().unwrap_or_default().pose();
         let (pose1, pose2) = (pose(arbiter.body1), pose(arbiter.body2));
         arbiter.data.contacts().map(move |(slot, contact)| {
             (slot, pose1.transform_point(contact.local_anchor1), pose2.transform_point(contact.local_anchor2))
@@ -88,6 +89,7 @@ impl World {
             return Err(Error::NeitherMoves { body1, body2 });
         }
         let index = self.create_arbiter(key, body1, body2);
+        self.arbiters.custom += 1;
         self.mix_body_materials(index);
         Ok(self.arbiters.at(index).id)
     }
@@ -172,7 +174,9 @@ impl World {
                 data: arbiter.data,
             });
         }
-        if pair != NONE {
+        if pair == NONE {
+            self.arbiters.custom -= 1;
+        } else {
             self.pairs[pair as usize].arbiter = NONE;
             self.pairs[pair as usize].has_manifold = false;
         }
@@ -209,10 +213,10 @@ impl World {
         let [a, b] = pair.shapes.map(|slot| &self.shapes[slot as usize]);
         let (ma, mb) = (&a.material, &b.material);
         let friction = ma.friction_combine.max(mb.friction_combine).combine(ma.friction, mb.friction);
-        let restitution =
-            ma.restitution_combine.max(mb.restitution_combine).combine(ma.restitution, mb.restitution);
+        let restitution = ma.restitution_combine.max(mb.restitution_combine).combine(ma.restitution, mb.restitution);
         let radius = max(a.geometry.rounding_radius(), b.geometry.rounding_radius());
-        let radius = if radius > 0.0 { radius } else { 0.25 * max(a.geometry.inner_radius(), b.geometry.inner_radius()) };
+        let radius =
+            if radius > 0.0 { radius } else { 0.25 * max(a.geometry.inner_radius(), b.geometry.inner_radius()) };
         let rolling = max(ma.rolling_resistance, mb.rolling_resistance) * radius;
         let velocity = |side: usize, local: Vec3| self.bodies[pair.bodies[side] as usize].pose.rotation.rotate(local);
         let tangent = velocity(0, ma.tangent_velocity) - velocity(1, mb.tangent_velocity);

@@ -352,7 +352,9 @@ impl<'a> BodyMut<'a> {
         state.linear_velocity = linear * free_linear;
         state.angular_velocity = angular * free_angular;
         self.world.solver_bodies.motions[index].residual = Vec3::ZERO;
-        self.body().frozen = false;
+        if std::mem::take(&mut self.body().frozen) {
+            self.world.refresh_solver_body(self.id.index);
+        }
         if changed != Vec3::ZERO {
             self.world.wake(self.id.index);
         }
@@ -622,10 +624,7 @@ impl World {
             let shape = &self.shapes[slot as usize];
             inner = crate::math::min(shape.geometry.inner_radius(), inner);
             let bounds = shape.geometry.local_aabb().transform(&shape.pose);
-            let far = crate::math::max3(
-                (bounds.max - body.mass.center).abs(),
-                (bounds.min - body.mass.center).abs(),
-            );
+            let far = crate::math::max3((bounds.max - body.mass.center).abs(), (bounds.min - body.mass.center).abs());
             reach = crate::math::max(far.length(), reach);
         }
         let body = &mut self.bodies[index as usize];
@@ -652,15 +651,17 @@ impl World {
         mass.inverse_mass = if dynamic { free_linear / body.mass.mass } else { Vec3::ZERO };
         mass.rotation = body.pose.rotation;
         mass.center = body.pose.transform_point(body.mass.center);
-        mass.inverse_inertia = if dynamic {
-            world_inverse_inertia(&mass.rotation.to_mat3(), motion)
-        } else {
-            SymmetricMat3::ZERO
-        };
+        mass.inverse_inertia =
+            if dynamic { world_inverse_inertia(&mass.rotation.to_mat3(), motion) } else { SymmetricMat3::ZERO };
+        let moves = dynamic && (free_linear != Vec3::ZERO || free_angular != Vec3::ZERO);
+        self.solver_bodies.states[index as usize].moves = u32::from(moves);
     }
 
     pub(crate) fn end_arbiters_of(&mut self, index: u32, reason: EndReason) {
-        while let Some(arbiter) = { let first = self.arbiters.of_body(index).next(); first } {
+        while let Some(arbiter) = {
+            let first = self.arbiters.of_body(index).next();
+            first
+        } {
             self.end_arbiter(arbiter, reason);
         }
     }

@@ -1,18 +1,18 @@
 //! The narrow phase of a step: for each active pair, a new manifold or last step's once more.
 //!
 //! A manifold is used again while the bodies have hardly moved against each other since it was made: the anchors turn and move
-//! with their bodies, so gaps stay exact, and only the choice of points and the normal are old. "Hardly" is relative to the
-//! size of the smaller shape, so small bodies are treated as large ones are. Materials and arbiters are read anew each step
+//! with their bodies, so gaps stay exact, and only the choice of points and the normal are old ([`Pair::hardly_moved`]). Materials and arbiters are read anew each step
 //! whatever is used again.
 //!
 //! Pairs are independent: they run on all threads, each writing its own arbiter. What begins is gathered and sorted by key.
 
 use super::World;
 use super::bodies::Body;
+use super::filters::UserFilters;
 use super::pairs::Pair;
 use super::settings::WorldSettings;
 use super::shapes::ShapeSlot;
-use crate::arbiter::{Arbiter, ArbiterKey, Contact, ContactData, EndReason, NONE, SLOTS};
+use crate::arbiter::{Arbiter, ArbiterKey, Contact, ContactData, EndReason, NONE, ONE_NORMAL, SLOTS};
 use crate::math::{Pose, Real, Vec3, max, min};
 use crate::narrow_phase::{Manifold, collide};
 use crate::parallel::SharedSlice;
@@ -21,11 +21,6 @@ use std::sync::Mutex;
 
 /// Pairs that a thread takes at a time.
 const PAIRS_PER_BLOCK: usize = 64;
-
-/// How far a pair may move, in shares of the smaller shape's inner radius, before its manifold is made anew.
-const REUSE_TRANSLATION: Real = 0.002;
-/// How far a pair may turn (sine of half the angle) before its manifold is made anew: 0.3°.
-const REUSE_ROTATION: Real = 0.0025;
 
 /// What a pair has to tell beyond its own records.
 #[derive(Clone, Copy, Debug)]
@@ -47,6 +42,9 @@ struct CollideContext<'a> {
     solver: &'a SolverBodies,
     broad_phase: &'a crate::broad_phase::BroadPhase,
     settings: &'a WorldSettings,
+    filters: &'a UserFilters,
+    /// Shapes whose proxies have moved since the last narrow phase.
+    moved: &'a [bool],
     dt: Real,
 }
 
@@ -95,6 +93,8 @@ impl World {
             solver: &self.solver_bodies,
             broad_phase: &self.broad_phase,
             settings: &self.scaled,
+            filters: &self.filters,
+            moved: &self.moved_shapes,
             dt,
         };
         let active = &self.active_pairs;
@@ -108,8 +108,7 @@ impl World {
                 // SAFETY: each active pair stands in the list once, and only this block visits it.
                 let pair = unsafe { pairs.get_mut(index as usize) };
                 // SAFETY: an arbiter belongs to one pair.
-                let arbiter =
-                    (pair.arbiter != NONE).then(|| unsafe { arbiters.get_mut(pair.arbiter as usize) });
+                let arbiter = (pair.arbiter != NONE).then(|| unsafe { arbiters.get_mut(pair.arbiter as usize) });
                 if let Some(item) = context.collide_pair(index, pair, arbiter) {
                     found.push(item);
                 }
@@ -127,11 +126,13 @@ impl World {
         }
         let pair = &self.pairs[pair_index as usize];
         let [b1, b2] = pair.bodies;
-        let relative = self.bodies[b1 as usize].pose.relative(&self.bodies[b2 as usize].pose);
+        let [center1, center2] = [b1, b2].map(|body| self.solver_bodies.masses[body as usize].pose());
+        let between = center1.relative(&center2);
+        let reusable = self.filters.contact.is_none();
         let index = self.create_arbiter(key, self.body_id(b1), self.body_id(b2));
         self.arbiters.at_mut(index).pair = pair_index;
         let pair = &mut self.pairs[pair_index as usize];
-        (pair.arbiter, pair.has_manifold, pair.manifold_pose) = (index, true, relative);
+        (pair.arbiter, pair.has_manifold, pair.manifold_pose) = (index, reusable, between);
         let context = ManifoldFrame::new(&self.pairs[pair_index as usize], &self.shapes, &self.bodies);
         let arbiter = self.arbiters.at_mut(index);
         update_contacts(&mut arbiter.data, manifold, &context, self.scaled.contact_break_distance);
@@ -152,26 +153,36 @@ impl World {
 
 impl CollideContext<'_> {
     fn collide_pair(&self, index: u32, pair: &mut Pair, arbiter: Option<&mut Arbiter>) -> Option<News> {
-        let [s1, s2] = pair.shapes.map(|slot| &self.shapes[slot as usize]);
-        if (s1.moved || s2.moved) && !self.boxes_overlap(pair) {
+        if pair.shapes.iter().any(|&slot| self.moved[slot as usize]) && !self.boxes_overlap(pair) {
             return Some(News::Apart(index));
         }
-        let [b1, b2] = pair.bodies.map(|body| &self.bodies[body as usize]);
-        let relative = b1.pose.relative(&b2.pose);
-        if pair.has_manifold && !pair.sensor && self.hardly_moved(pair, &relative, s1, s2) {
+        let [center1, center2] = pair.bodies.map(|body| self.solver.masses[body as usize].pose());
+        let between = center1.relative(&center2);
+        if pair.has_manifold && pair.hardly_moved(&between) {
             return None;
         }
+        self.collide_anew(index, pair, &between, arbiter)
+    }
+
+    /// Makes a new manifold.
+    fn collide_anew(&self, index: u32, pair: &mut Pair, between: &Pose, arbiter: Option<&mut Arbiter>) -> Option<News> {
+        let [s1, s2] = pair.shapes.map(|slot| &self.shapes[slot as usize]);
+        let [b1, b2] = pair.bodies.map(|body| &self.bodies[body as usize]);
+        let relative = b1.pose.relative(&b2.pose);
         let margin = if pair.sensor { 0.0 } else { self.margin(pair, s1, s2) };
         let mut manifold = Manifold::EMPTY;
         let shapes_relative = s1.pose.inverse().mul(&relative.mul(&s2.pose));
         collide(&s1.geometry, &s2.geometry, &shapes_relative, margin, &mut pair.cache, &mut manifold);
+        if !self.filters.passes_contact(pair, (self.shapes, self.bodies), &mut manifold) {
+            manifold.clear();
+        }
         if pair.sensor {
             let overlaps = !manifold.points().is_empty();
             return (overlaps != pair.overlapping).then_some(News::Sensor(index, overlaps));
         }
         let frame = ManifoldFrame::new(pair, self.shapes, self.bodies);
         if let Some(arbiter) = arbiter {
-            (pair.has_manifold, pair.manifold_pose) = (true, relative);
+            (pair.has_manifold, pair.manifold_pose) = (self.filters.contact.is_none(), *between);
             update_contacts(&mut arbiter.data, &manifold, &frame, self.settings.contact_break_distance);
             return manifold.points().is_empty().then_some(News::Empty(pair.arbiter));
         }
@@ -182,21 +193,6 @@ impl CollideContext<'_> {
     fn boxes_overlap(&self, pair: &Pair) -> bool {
         let [a, b] = pair.shapes.map(|slot| self.broad_phase.fat_aabb(slot));
         matches!((a, b), (Some(a), Some(b)) if a.overlaps(b))
-    }
-
-    /// Whether the pair is so nearly where its manifold was made that the manifold may stay.
-    fn hardly_moved(&self, pair: &Pair, relative: &Pose, s1: &ShapeSlot, s2: &ShapeSlot) -> bool {
-        let size = |shape: &ShapeSlot| {
-            let radius = shape.geometry.inner_radius();
-            if radius > 0.0 { radius } else { Real::MAX }
-        };
-        let limit = REUSE_TRANSLATION * min(size(s1), size(s2));
-        let old = &pair.manifold_pose;
-        let moved = relative.position - old.position;
-        let turned = old.rotation.conjugate().mul(relative.rotation).vector();
-        let reach = max(self.bodies[pair.bodies[0] as usize].reach, 0.0);
-        let _ = reach;
-        moved.length_squared() < limit * limit && turned.length_squared() < REUSE_ROTATION * REUSE_ROTATION
     }
 
     /// Gap up to which contacts count: the speculative distance, more for pairs that move fast against each other, but not
@@ -306,7 +302,6 @@ fn update_contacts(data: &mut ContactData, manifold: &Manifold, frame: &Manifold
         }
     }
     let mut used: u8 = matches.iter().filter(|&&slot| slot < SLOTS).fold(0, |mask, &slot| mask | 1 << slot);
-    let claimed = used;
     for i in 0..points.len() {
         if matches[i] < SLOTS {
             contacts[i].inherit(&old[matches[i]]);
@@ -316,6 +311,7 @@ fn update_contacts(data: &mut ContactData, manifold: &Manifold, frame: &Manifold
         }
         data.slots[matches[i]] = contacts[i];
     }
-    debug_assert!(claimed & !15 == 0);
     data.usage_mask = data.usage_mask & 0xf0 | used;
+    let one_normal = points.iter().all(|point| point.normal == points[0].normal);
+    data.flags = data.flags & !ONE_NORMAL | if one_normal { ONE_NORMAL } else { 0 };
 }

@@ -26,7 +26,9 @@ impl World {
         let mut first: Real = 1.0;
         for &slot in &body.shape_slots {
             let shape = &self.shapes[slot as usize];
-            if !shape.sensor && let Some(support) = Support::new(&shape.geometry) {
+            if !shape.sensor
+                && let Some(support) = Support::new(&shape.geometry)
+            {
                 let from_center = center.inverse().mul(&shape.pose);
                 let path = Sweep { start: start.mul(&from_center), end: end.mul(&from_center) };
                 first = min(self.first_impact(shape, &support, &path, first), first);
@@ -60,9 +62,8 @@ impl World {
                 let pose = body.pose.mul(&other.pose);
                 let impact = match &other.geometry {
                     Shape::Mesh(mesh) => self.mesh_impact(mesh, &pose, support, path),
-                    convex => Support::new(convex).and_then(|fixed| {
-                        time_of_impact(&fixed, &Sweep::still(pose), support, path, self.scaled.slop)
-                    }),
+                    convex => Support::new(convex)
+                        .and_then(|fixed| time_of_impact(&fixed, &Sweep::still(pose), support, path, self.scaled.slop)),
                 };
                 first = min(impact.unwrap_or(limit), first);
             }

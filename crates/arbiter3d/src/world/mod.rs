@@ -7,6 +7,7 @@ mod continuous;
 mod definition;
 pub(crate) mod error;
 mod events;
+mod filters;
 mod id;
 mod numbers;
 mod pairs;
@@ -22,6 +23,7 @@ pub use bodies::{BodyMut, BodyRef};
 pub use definition::{BodyDefinition, BodyKind, CombineRule, Filter, LockedAxes, Material, ShapeDefinition};
 pub use error::{Error, UNIT_TOLERANCE};
 pub use events::{BeginEvent, BeginListener, ContactProvider, EndEvent, EndListener, SensorEvent, StepContext};
+pub use filters::{ContactFilter, PairFilter, ShapePair};
 pub use id::{BodyId, ShapeId};
 pub use queries::{QueryFilter, RayHit};
 pub use settings::WorldSettings;
@@ -71,6 +73,8 @@ pub struct World {
     awake: Vec<u32>,
     shapes: Vec<shapes::ShapeSlot>,
     free_shapes: Vec<u32>,
+    /// Shapes whose proxies have moved since the last narrow phase, by slot.
+    moved_shapes: Vec<bool>,
     shape_slots: IdMap<u64, u32>,
     broad_phase: BroadPhase,
     pairs: Vec<pairs::Pair>,
@@ -86,6 +90,7 @@ pub struct World {
     pool: StagePool,
     events: events::Events,
     listeners: events::Listeners,
+    filters: filters::UserFilters,
     providers: Vec<Box<dyn ContactProvider>>,
     removals: Vec<events::Removal>,
     timings: Timings,
@@ -137,6 +142,7 @@ impl World {
             awake: Vec::new(),
             shapes: Vec::new(),
             free_shapes: Vec::new(),
+            moved_shapes: Vec::new(),
             shape_slots: IdMap::default(),
             broad_phase: BroadPhase::new(),
             pairs: Vec::new(),
@@ -152,6 +158,7 @@ impl World {
             pool: StagePool::new(settings.threads),
             events: events::Events::default(),
             listeners: events::Listeners::default(),
+            filters: filters::UserFilters::default(),
             providers: Vec::new(),
             removals: Vec::new(),
             timings: Timings::default(),
@@ -357,7 +364,7 @@ impl World {
 
     /// A proxy has moved: its pairs are tested for overlap in the next narrow phase.
     fn note_moved(&mut self, slot: u32) {
-        self.shapes[slot as usize].moved = true;
+        self.moved_shapes[slot as usize] = true;
         self.scratch.note_moved(slot);
         // Pairs whose bodies all rest are not visited: they are tested here and now.
         let body = self.shapes[slot as usize].body;

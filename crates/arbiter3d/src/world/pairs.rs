@@ -7,7 +7,7 @@
 use super::World;
 use super::definition::BodyKind;
 use crate::arbiter::{EndReason, NONE};
-use crate::math::Pose;
+use crate::math::{Pose, Real, max, min};
 use crate::narrow_phase::PairCache;
 
 /// What the world keeps of a pair. Shape 1 has the smaller id.
@@ -25,14 +25,33 @@ pub(crate) struct Pair {
     pub overlapping: bool,
     /// Whether `manifold_pose` holds: cleared by teleports and edits.
     pub has_manifold: bool,
-    /// Body 2 seen from body 1 when the manifold was made.
+    /// Centre frame of body 2 seen from that of body 1 when the manifold was made.
     pub manifold_pose: Pose,
+    /// How far the pair may move (metres) before its manifold is made anew.
+    reuse_distance: Real,
     pub cache: PairCache,
     next: [u32; 2],
     previous: [u32; 2],
 }
 
+/// How far a pair may move, in shares of the smaller shape's inner radius, before its manifold is made anew.
+const REUSE_TRANSLATION: Real = 0.002;
+/// How far a pair may turn (sine of half the angle) before its manifold is made anew: 0.3°.
+const REUSE_ROTATION: Real = 0.0025;
+
 impl Pair {
+    /// Whether the pair is so nearly where its manifold was made that the manifold may stay.
+    ///
+    /// Relative to the size of the smaller shape, so that small bodies are treated as large ones are.
+    #[inline(always)]
+    pub fn hardly_moved(&self, between: &Pose) -> bool {
+        let old = &self.manifold_pose;
+        let moved = between.position - old.position;
+        let turned = old.rotation.conjugate().mul(between.rotation).vector();
+        moved.length_squared() < self.reuse_distance * self.reuse_distance
+            && turned.length_squared() < REUSE_ROTATION * REUSE_ROTATION
+    }
+
     pub fn has_shape(&self, slot: u32) -> bool {
         self.shapes[0] == slot || self.shapes[1] == slot
     }
@@ -69,6 +88,7 @@ impl World {
             overlapping: false,
             has_manifold: false,
             manifold_pose: Pose::IDENTITY,
+            reuse_distance: self.reuse_distance(shapes),
             cache: PairCache::default(),
             next: [NONE; 2],
             previous: [NONE; 2],
@@ -86,6 +106,15 @@ impl World {
         if bodies.iter().any(|&body| self.bodies[body as usize].awake) {
             self.activate_pair(index);
         }
+    }
+
+    fn reuse_distance(&self, shapes: [u32; 2]) -> Real {
+        let radii = shapes.map(|slot| self.shapes[slot as usize].geometry.inner_radius());
+        let smaller = match radii {
+            [a, b] if a > 0.0 && b > 0.0 => min(a, b),
+            [a, b] => max(a, b), // a mesh has no inside
+        };
+        REUSE_TRANSLATION * smaller
     }
 
     /// Ends a pair: its arbiter ends for `reason`, a sensor's overlap ends too.

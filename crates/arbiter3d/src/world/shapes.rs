@@ -22,8 +22,6 @@ pub(crate) struct ShapeSlot {
     pub material: Material,
     pub filter: Filter,
     pub sensor: bool,
-    /// Whether its proxy has moved since the last narrow phase.
-    pub moved: bool,
     pub user_data: u128,
 }
 
@@ -225,7 +223,6 @@ impl World {
             material: definition.material,
             filter: definition.filter,
             sensor: definition.sensor,
-            moved: true,
             user_data: definition.user_data,
         };
         let slot = if let Some(slot) = self.free_shapes.pop() {
@@ -233,6 +230,7 @@ impl World {
             slot
         } else {
             self.shapes.push(shape);
+            self.moved_shapes.push(false);
             (self.shapes.len() - 1) as u32
         };
         self.shape_slots.insert(id.0, slot);
@@ -302,13 +300,13 @@ impl World {
             BodyKind::Kinematic | BodyKind::Dynamic => TreeKind::Moving,
         };
         self.broad_phase.add(slot, kind, fat);
-        self.shapes[slot as usize].moved = true;
     }
 
     /// Takes a shape out of the broad phase with all its pairs.
     pub(crate) fn remove_proxy(&mut self, slot: u32, reason: EndReason) {
         let body = self.shapes[slot as usize].body;
-        let pairs: Vec<u32> = self.pairs_of_body(body).filter(|&pair| self.pairs[pair as usize].has_shape(slot)).collect();
+        let pairs: Vec<u32> =
+            self.pairs_of_body(body).filter(|&pair| self.pairs[pair as usize].has_shape(slot)).collect();
         for pair in pairs {
             self.remove_pair(pair, reason);
         }

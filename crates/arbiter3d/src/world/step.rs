@@ -134,7 +134,9 @@ impl World {
         broad_phase.find_pairs(|a, b| !self.pair_set.contains(a, b) && self.may_pair(a, b), &mut found);
         self.broad_phase = broad_phase;
         for &(a, b) in &found {
-            self.add_pair(a, b);
+            if self.passes_pair_filter(a, b) {
+                self.add_pair(a, b);
+            }
         }
         found.clear();
         self.scratch.pairs = found;
@@ -147,7 +149,7 @@ impl World {
         }
         self.providers = providers;
         for shape in self.scratch.moved.drain(..) {
-            self.shapes[shape as usize].moved = false;
+            self.moved_shapes[shape as usize] = false;
         }
     }
 
@@ -269,7 +271,7 @@ impl World {
                 BodyNews::Fast(body) => self.stop_at_impact(body),
                 BodyNews::Moved { shape, tight, fat } => {
                     if self.broad_phase.update(shape, &tight, &fat) {
-                        self.shapes[shape as usize].moved = true;
+                        self.moved_shapes[shape as usize] = true;
                         self.scratch.moved.push(shape);
                     }
                 }
@@ -280,12 +282,8 @@ impl World {
 
     fn finalize_bodies(&mut self, dt: Real, news: &Mutex<Vec<BodyNews>>) {
         let awake = &self.scratch.sorted_awake;
-        let world = FinalizeContext {
-            shapes: &self.shapes,
-            broad_phase: &self.broad_phase,
-            settings: &self.scaled,
-            dt,
-        };
+        let world =
+            FinalizeContext { shapes: &self.shapes, broad_phase: &self.broad_phase, settings: &self.scaled, dt };
         let bodies = SharedSlice::new(&mut self.bodies);
         let states = SharedSlice::new(&mut self.solver_bodies.states);
         let motions = SharedSlice::new(&mut self.solver_bodies.motions);
@@ -295,9 +293,8 @@ impl World {
             for &index in block_of(awake, block) {
                 let at = index as usize;
                 // SAFETY: a body stands in the list once.
-                let (body, state, motion, mass) = unsafe {
-                    (bodies.get_mut(at), states.get_mut(at), motions.get_mut(at), masses.get_mut(at))
-                };
+                let (body, state, motion, mass) =
+                    unsafe { (bodies.get_mut(at), states.get_mut(at), motions.get_mut(at), masses.get_mut(at)) };
                 world.finalize_body(index, (body, state, motion, mass), &mut found);
             }
             if !found.is_empty() {
@@ -322,15 +319,16 @@ impl World {
         let may_break = std::mem::take(&mut self.scratch.may_break);
         for (row, _) in self.plan.rows.iter().zip(&may_break).filter(|(_, may_break)| **may_break) {
             let arbiter = self.arbiters.at_mut(row.arbiter);
-            let [pose1, pose2] = [arbiter.body1, arbiter.body2]
-                .map(|body| self.solver_bodies.masses[body.index as usize].pose());
+            let [pose1, pose2] =
+                [arbiter.body1, arbiter.body2].map(|body| self.solver_bodies.masses[body.index as usize].pose());
             arbiter.data.break_contacts(&pose1, &pose2, self.scaled.contact_break_distance);
             if arbiter.data.usage_mask & 15 == 0 {
                 empty.push(row.arbiter);
             }
         }
         self.scratch.may_break = may_break;
-        for &(_, index) in self.arbiters.order() {
+        let custom = if self.arbiters.custom > 0 { self.arbiters.order() } else { &[] };
+        for &(_, index) in custom {
             let arbiter = self.arbiters.at(index);
             if arbiter.alive && arbiter.pair == NONE && arbiter.data.usage_mask & 15 == 0 {
                 empty.push(index);
@@ -418,7 +416,8 @@ impl FinalizeContext<'_> {
         let speculative = self.settings.speculative_distance;
         let size = shape.geometry.inner_radius();
         let ahead = displacement.length();
-        let reach = if ahead > speculative { displacement * (min(ahead, size + speculative) / ahead) } else { Vec3::ZERO };
+        let reach =
+            if ahead > speculative { displacement * (min(ahead, size + speculative) / ahead) } else { Vec3::ZERO };
         let tight = tight.sweep(reach);
         let near = tight.expand(speculative);
         if self.broad_phase.fat_aabb(slot).is_some_and(|fat| !fat.contains(&near)) {

@@ -1,0 +1,131 @@
+//! The scenes whose outcome is known do what a formula or other engines say.
+
+use arbiter3d::{
+    BodyId, BodyKind, World,
+    math::{Rotation, Vec3},
+};
+use arbiter3d_scenes::{BuiltScene, SceneOptions, find};
+
+fn built(name: &str) -> BuiltScene {
+    find(name).unwrap().build(&SceneOptions::default()).unwrap()
+}
+
+fn run(scene: &mut BuiltScene, steps: usize) {
+    for step in 0..steps {
+        let report = scene.step(step).unwrap();
+        assert!(report.frozen.is_empty(), "step {step} froze {:?}", report.frozen);
+    }
+}
+
+fn dynamic(world: &World) -> Vec<BodyId> {
+    world.bodies().filter(|&id| world.body(id).unwrap().kind() == BodyKind::Dynamic).collect()
+}
+
+fn positions(world: &World) -> Vec<Vec3> {
+    dynamic(world).iter().map(|&id| world.body(id).unwrap().position()).collect()
+}
+
+fn mean_height(world: &World) -> f64 {
+    let positions = positions(world);
+    positions.iter().map(|p| f64::from(p.y)).sum::<f64>() / positions.len() as f64
+}
+
+/// Boxes with friction μ on 30° slide at g (sin 30° − μ cos 30°), or not at all where that is below zero.
+#[test]
+fn boxes_on_the_ramp_slide_as_coulomb_says() {
+    let mut scene = built("ramps");
+    let start = positions(&scene.world);
+    let seconds = 2.0;
+    run(&mut scene, 120);
+    for (index, (before, after)) in start.iter().zip(positions(&scene.world)).enumerate() {
+        let friction = 0.1 * index as f64;
+        let acceleration = 9.81 * (0.5 - friction * 0.75_f64.sqrt());
+        let moved = f64::from((after - *before).length());
+        if acceleration > 0.0 {
+            let expected = 0.5 * acceleration * seconds * seconds;
+            assert!((moved / expected - 1.0).abs() < 0.02, "friction {friction}: {moved} m, expected {expected} m");
+        } else {
+            assert!(moved < 0.01, "friction {friction} slid {moved} m");
+        }
+    }
+}
+
+/// A ball with restitution e that falls from h rises to e² h.
+#[test]
+fn balls_rise_by_the_square_of_their_restitution() {
+    let mut scene = built("bounce");
+    let mut has_bounced = [false; 11];
+    let mut top = [0.0_f32; 11];
+    for step in 0..150 {
+        scene.step(step).unwrap();
+        for (index, &id) in dynamic(&scene.world).iter().enumerate() {
+            let body = scene.world.body(id).unwrap();
+            // The first rise ends where the ball falls again.
+            has_bounced[index] |= body.linear_velocity().y > 0.0;
+            let falls_again = has_bounced[index] && body.linear_velocity().y < -1.0;
+            if has_bounced[index] && !falls_again && step < 122 {
+                top[index] = top[index].max(body.position().y - 0.5);
+            }
+        }
+    }
+    for (index, top) in top.iter().enumerate().skip(3) {
+        let expected = 5.0 * (0.1 * index as f32) * (0.1 * index as f32);
+        assert!(
+            (top - expected).abs() < 0.02 * expected + 0.02,
+            "restitution 0.{index}: {top} m, expected {expected} m"
+        );
+    }
+}
+
+/// The handle flips 37 times in 20 s, by the exact motion of a free body.
+#[test]
+fn the_handle_flips_as_often_as_euler_says() {
+    let mut scene = built("t_handle");
+    let handle = dynamic(&scene.world)[0];
+    let mut flips = 0;
+    let mut last = 1.0;
+    for step in 0..scene.steps {
+        scene.step(step).unwrap();
+        let body = scene.world.body(handle).unwrap();
+        let spin = Rotation::from_quat(body.rotation()).inverse_rotate(body.angular_velocity()).x;
+        if spin * last < 0.0 {
+            flips += 1;
+        }
+        last = spin;
+    }
+    assert!((36..=38).contains(&flips), "{flips} flips");
+}
+
+/// After 100 steps the colosseum stands where it stands on other engines.
+#[test]
+fn the_colosseum_stands() {
+    let mut scene = built("colosseum");
+    run(&mut scene, 100);
+    let mean = mean_height(&scene.world);
+    assert!((mean - 8.13).abs() < 0.02, "mean height {mean}");
+}
+
+/// After 200 steps the top of the large pyramid has sunk by less than a cube's half, and no cube has left its row.
+#[test]
+fn the_large_pyramid_stands() {
+    let mut scene = built("large_pyramid");
+    let before = positions(&scene.world);
+    run(&mut scene, 200);
+    for (before, after) in before.iter().zip(positions(&scene.world)) {
+        assert!((after - *before).length() < 0.5, "from {before} to {after}");
+    }
+}
+
+/// The ball breaks the colosseum: it had slept or stood before, and has lost height after.
+#[test]
+fn the_ball_breaks_the_colosseum() {
+    let mut scene =
+        find("colosseum_break").unwrap().build(&SceneOptions { size: Some(3), ..SceneOptions::default() }).unwrap();
+    run(&mut scene, 120);
+    let stood = mean_height(&scene.world);
+    for step in 120..300 {
+        scene.step(step).unwrap();
+    }
+    let fallen = mean_height(&scene.world);
+    assert!(fallen < stood - 0.2, "mean height {stood} m, then {fallen} m");
+}

@@ -1,0 +1,106 @@
+//! Filters of the user's own: which pairs are looked at, and which manifolds count.
+
+use super::World;
+use super::id::{BodyId, ShapeId};
+use super::pairs::Pair;
+use crate::arbiter::EndReason;
+use crate::narrow_phase::Manifold;
+
+/// Two shapes that may collide; shape 1 has the smaller id.
+///
+/// ```
+/// use arbiter3d::World;
+/// let mut world = World::default();
+/// // Only neighbours in creation order collide.
+/// world.set_pair_filter(Some(Box::new(|pair| pair.shape2.raw() - pair.shape1.raw() == 1)));
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct ShapePair {
+    /// Shape with the smaller id.
+    pub shape1: ShapeId,
+    /// The other shape.
+    pub shape2: ShapeId,
+    /// Body of shape 1.
+    pub body1: BodyId,
+    /// Body of shape 2.
+    pub body2: BodyId,
+}
+
+/// Decides whether two shapes whose boxes have come together collide at all: `true` lets them.
+pub type PairFilter = Box<dyn Fn(&ShapePair) -> bool + Send + Sync>;
+
+/// Sees each new manifold, in the frame of shape 1, before it becomes contacts; may change it; `false` drops it.
+///
+/// Called from all threads, in no particular order.
+pub type ContactFilter = Box<dyn Fn(&ShapePair, &mut Manifold) -> bool + Send + Sync>;
+
+/// The filters set.
+#[derive(Default)]
+pub(crate) struct UserFilters {
+    pub pair: Option<PairFilter>,
+    pub contact: Option<ContactFilter>,
+}
+
+impl std::fmt::Debug for UserFilters {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("UserFilters")
+            .field("pair", &self.pair.is_some())
+            .field("contact", &self.contact.is_some())
+            .finish()
+    }
+}
+
+impl World {
+    /// Asks `filter` about each pair of shapes whose boxes come together, after the shapes' own filters. Pairs that exist are
+    /// asked about again at once; arbiters that this rules out end. `None` lets all pass.
+    pub fn set_pair_filter(&mut self, filter: Option<PairFilter>) {
+        self.filters.pair = filter;
+        for index in 0..self.pairs.len() as u32 {
+            let pair = &self.pairs[index as usize];
+            if pair.alive && !self.passes_pair_filter(pair.shapes[0], pair.shapes[1]) {
+                self.remove_pair(index, EndReason::FilterChanged);
+            }
+        }
+        for slot in 0..self.shapes.len() as u32 {
+            self.broad_phase.touch(slot);
+        }
+        self.flush_events();
+    }
+
+    /// Shows `filter` each new manifold before it becomes contacts. While one is set, manifolds are made anew in each step.
+    /// `None` lets all pass.
+    pub fn set_contact_filter(&mut self, filter: Option<ContactFilter>) {
+        self.filters.contact = filter;
+        for pair in &mut self.pairs {
+            pair.has_manifold = false;
+        }
+    }
+
+    pub(crate) fn passes_pair_filter(&self, a: u32, b: u32) -> bool {
+        self.filters.pair.as_ref().is_none_or(|filter| {
+            let (low, high) = if self.shapes[a as usize].id < self.shapes[b as usize].id { (a, b) } else { (b, a) };
+            filter(&self.shape_pair([low, high]))
+        })
+    }
+
+    fn shape_pair(&self, shapes: [u32; 2]) -> ShapePair {
+        let [s1, s2] = shapes.map(|slot| &self.shapes[slot as usize]);
+        ShapePair { shape1: s1.id, shape2: s2.id, body1: self.body_id(s1.body), body2: self.body_id(s2.body) }
+    }
+}
+
+impl UserFilters {
+    /// Whether the manifold counts; the filter may change it.
+    pub fn passes_contact(
+        &self,
+        pair: &Pair,
+        context: (&[super::shapes::ShapeSlot], &[super::bodies::Body]),
+        manifold: &mut Manifold,
+    ) -> bool {
+        let Some(filter) = &self.contact else { return true };
+        let (shapes, bodies) = context;
+        let [s1, s2] = pair.shapes.map(|slot| &shapes[slot as usize]);
+        let id = |index: u32| BodyId { index, generation: bodies[index as usize].generation };
+        filter(&ShapePair { shape1: s1.id, shape2: s2.id, body1: id(s1.body), body2: id(s2.body) }, manifold)
+    }
+}
