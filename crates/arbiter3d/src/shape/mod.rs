@@ -215,6 +215,21 @@ impl Shape {
         }
     }
 
+    /// Distance of the farthest point of the shape from the origin of its frame, metres; for meshes an upper bound.
+    #[must_use]
+    pub fn reach(&self) -> Real {
+        match self {
+            Self::Sphere(s) => s.radius(),
+            Self::Capsule(s) => s.half_length() + s.radius(),
+            Self::Cuboid(s) => s.half_extents().length(),
+            Self::Hull(s) => s.vertices().iter().fold(0.0, |far, v| crate::math::max(v.length(), far)),
+            Self::Mesh(s) => {
+                let bounds = s.local_aabb();
+                crate::math::max3(bounds.max.abs(), bounds.min.abs()).length()
+            }
+        }
+    }
+
     /// The radius that rolls: how far the surface is from the inner core of a rounded shape, zero for polyhedra.
     #[must_use]
     pub fn rounding_radius(&self) -> Real {

@@ -1,6 +1,7 @@
 //! Arbiters as the world's users see them: look up, make, feed, remove.
 
 use super::World;
+use super::definition::Material;
 use super::error::{Error, finite_vec, unit_vec};
 use super::events::EndEvent;
 use super::id::BodyId;
@@ -8,7 +9,8 @@ use crate::arbiter::{
     Arbiter, ArbiterId, ArbiterKey, Contact, ContactPoint, EndReason, FRICTION_OVERRIDDEN, NONE,
     RESTITUTION_OVERRIDDEN, ROLLING_OVERRIDDEN, SolveMode, TANGENT_VELOCITY_OVERRIDDEN,
 };
-use crate::math::{Vec3, max};
+use crate::math::{Real, Vec3, max};
+use crate::shape::Shape;
 use std::ops::Range;
 
 /// Ids that one call may reserve.
@@ -214,10 +216,8 @@ impl World {
         let (ma, mb) = (&a.material, &b.material);
         let friction = ma.friction_combine.max(mb.friction_combine).combine(ma.friction, mb.friction);
         let restitution = ma.restitution_combine.max(mb.restitution_combine).combine(ma.restitution, mb.restitution);
-        let radius = max(a.geometry.rounding_radius(), b.geometry.rounding_radius());
-        let radius =
-            if radius > 0.0 { radius } else { 0.25 * max(a.geometry.inner_radius(), b.geometry.inner_radius()) };
-        let rolling = max(ma.rolling_resistance, mb.rolling_resistance) * radius;
+        let rolling = max(ma.rolling_resistance, mb.rolling_resistance)
+            * rolling_radius([&a.geometry, &b.geometry], [ma, mb].map(|m| m.rolling_resistance));
         let velocity = |side: usize, local: Vec3| self.bodies[pair.bodies[side] as usize].pose.rotation.rotate(local);
         let tangent = velocity(0, ma.tangent_velocity) - velocity(1, mb.tangent_velocity);
         let data = &mut self.arbiters.at_mut(index).data;
@@ -254,7 +254,7 @@ impl World {
                 any = true;
             }
         }
-        let default = super::Material::default();
+        let default = Material::default();
         let data = &mut self.arbiters.at_mut(index).data;
         if data.flags & FRICTION_OVERRIDDEN == 0 {
             data.friction = if any { friction } else { default.friction };
@@ -275,6 +275,13 @@ impl World {
             }
         }
     }
+}
+
+/// Radius that rolls: that of the round shape, or for polyhedra with a resistance of their own a quarter of the inner radius.
+fn rolling_radius(shapes: [&Shape; 2], resistances: [Real; 2]) -> Real {
+    let round = max(shapes[0].rounding_radius(), shapes[1].rounding_radius());
+    let set = resistances.iter().any(|&r| r > Material::DEFAULT_ROLLING_RESISTANCE);
+    if round > 0.0 || !set { round } else { 0.25 * max(shapes[0].inner_radius(), shapes[1].inner_radius()) }
 }
 
 fn validate_point(contact: &ContactPoint) -> Result<(), Error> {

@@ -623,9 +623,8 @@ impl World {
         for &slot in &body.shape_slots {
             let shape = &self.shapes[slot as usize];
             inner = crate::math::min(shape.geometry.inner_radius(), inner);
-            let bounds = shape.geometry.local_aabb().transform(&shape.pose);
-            let far = crate::math::max3((bounds.max - body.mass.center).abs(), (bounds.min - body.mass.center).abs());
-            reach = crate::math::max(far.length(), reach);
+            let center = (shape.pose.position - body.mass.center).length();
+            reach = crate::math::max(center + shape.geometry.reach(), reach);
         }
         let body = &mut self.bodies[index as usize];
         body.inner_radius = if body.shape_slots.is_empty() { 0.0 } else { inner };
