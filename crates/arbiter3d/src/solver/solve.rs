@@ -144,6 +144,9 @@ pub(crate) unsafe fn relax<const L: usize, const P: usize, const C: usize>(
 
 /// Gives points that were hit their share of the approach speed back.
 ///
+/// The points of a manifold share the bounce: what one gives, it gives to all through the coupling. One sweep over four
+/// points costs a box that lands flat 7 % of its height; eight leave less than a tenth of a percent.
+///
 /// # Safety
 /// No other thread may touch the dynamic bodies of the row.
 #[inline(always)]
@@ -162,29 +165,40 @@ pub(crate) unsafe fn restitute<const L: usize, const P: usize, const C: usize>(
     let (mut v2, _) = unsafe { gather(states, &row.body2) };
     let mut velocities = normal_velocities(row, &v1, &v2);
     let threshold = Wide::splat(-pass.restitution_threshold);
+    let own: [Wide<L>; P] = std::array::from_fn(|i| row.points[i].mass.inverse_or_zero());
     let mut sum = Impulse::ZERO;
-    let mut pair = 0;
-    for i in 0..P {
-        let target = friction.restitution * friction.approach[i];
-        let old = row.impulses[i];
-        let wanted = (old - row.points[i].mass * (velocities[i] + target)).max(Wide::ZERO);
-        // Bounces only what hit: closing fast enough, and pressed within this step.
-        let bounces = (threshold - friction.approach[i]).if_positive(friction.totals[i], Wide::ZERO);
-        let new = (bounces * friction.restitution).if_positive(wanted, old);
-        let delta = new - old;
-        row.impulses[i] = new;
-        friction.totals[i] += delta;
-        for later in &mut velocities[i + 1..] {
-            *later += row.coupling[pair] * delta;
-            pair += 1;
+    for _ in 0..if P > 1 { RESTITUTION_SWEEPS } else { 1 } {
+        for i in 0..P {
+            let target = friction.restitution * friction.approach[i];
+            let old = row.impulses[i];
+            let wanted = (old - row.points[i].mass * (velocities[i] + target)).max(Wide::ZERO);
+            // Bounces only what hit: closing fast enough, and pressed within this step.
+            let bounces = (threshold - friction.approach[i]).if_positive(friction.totals[i], Wide::ZERO);
+            let new = (bounces * friction.restitution).if_positive(wanted, old);
+            let delta = new - old;
+            row.impulses[i] = new;
+            friction.totals[i] += delta;
+            for j in 0..P {
+                let response = if i == j { own[i] } else { row.coupling[pair_of::<P>(i.min(j), i.max(j))] };
+                velocities[j] += response * delta;
+            }
+            sum.add_point(row, i, delta);
         }
-        sum.add_point(row, i, delta);
     }
     sum.apply(row, &mut v1, &mut v2);
     // SAFETY: promised by the caller.
     unsafe { scatter(states, &row.body1, &v1) };
     // SAFETY: promised by the caller.
     unsafe { scatter(states, &row.body2, &v2) };
+}
+
+/// Sweeps of the bounce over the points of a manifold; once a step, and only where something bounces.
+const RESTITUTION_SWEEPS: usize = 8;
+
+/// Place of the points `i < j` in [`NormalRow::coupling`].
+#[inline(always)]
+const fn pair_of<const P: usize>(i: usize, j: usize) -> usize {
+    i * P - i * (i + 1) / 2 + j - i - 1
 }
 
 /// Normal velocity at each point.
