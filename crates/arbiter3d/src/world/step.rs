@@ -263,8 +263,9 @@ impl World {
         // Threads report in any order; the trees and the report must not depend on it.
         news.sort_unstable_by_key(|item| match *item {
             BodyNews::Broken(body) => (0, body),
-            BodyNews::Fast(body) => (1, body),
-            BodyNews::Moved { shape, .. } => (2, shape),
+            // Before the fast: a body that is stopped short moves its boxes back.
+            BodyNews::Moved { shape, .. } => (1, shape),
+            BodyNews::Fast(body) => (2, body),
         });
         for item in news.drain(..) {
             match item {
