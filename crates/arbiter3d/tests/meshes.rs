@@ -124,12 +124,12 @@ fn a_capsule_slides_over_inner_edges() {
 #[test]
 fn a_ball_rolls_over_a_mesh_as_over_a_plane() {
     let mut world = sleepless();
-    world.add_shape(BodyId::WORLD, &ShapeDefinition::new(flat())).unwrap();
+    world.add_shape(BodyId::WORLD, &ShapeDefinition::new(flat()).rolling_resistance(0.0)).unwrap();
     for degrees in [0.0, 10.0, 45.0, 80.0] {
         let ahead = heading(degrees);
         let axis = Vec3::Y.cross(ahead);
         let body = BodyDefinition::dynamic().at(Vec3::Y * 0.3).moving(ahead * 3.0, axis * 10.0);
-        let body = add(&mut world, &body, &ShapeDefinition::new(sphere(0.3)));
+        let body = add(&mut world, &body, &ShapeDefinition::new(sphere(0.3)).rolling_resistance(0.0));
         run(&mut world, 3.0);
         assert_relative(position(&world, body).dot(ahead), 9.0, 0.005, "way");
         assert_near(position(&world, body).y, 0.3, 0.002, "height");
