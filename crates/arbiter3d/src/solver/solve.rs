@@ -6,8 +6,10 @@
 //!
 //! Softness, with `ω = 2π·hertz`, damping ratio `ζ` and substep `h`:
 //!
-//!     a₁ = 2ζ + hω,  a₂ = hω·a₁,  bias rate = ω/a₁,  mass scale = a₂/(1 + a₂),  impulse scale = 1/(1 + a₂)
-//!     λ' = max(λ − m (mass scale · vₙ + bias) − impulse scale · λ, 0)
+//! ```text
+//! a₁ = 2ζ + hω,  a₂ = hω·a₁,  bias rate = ω/a₁,  mass scale = a₂/(1 + a₂),  impulse scale = 1/(1 + a₂)
+//! λ' = max(λ − m (mass scale · vₙ + bias) − impulse scale · λ, 0)
+//! ```
 //!
 //! Arbiters of one or two contacts bear on these what others bear on four: past a slop their spring is twice as stiff, as
 //! those against the ground are, so that what is wedged into a heap with many times its weight stays within two slops. Not so
