@@ -6,8 +6,10 @@
 //!
 //! Softness, with `ω = 2π·hertz`, damping ratio `ζ` and substep `h`:
 //!
-//!     a₁ = 2ζ + hω,  a₂ = hω·a₁,  bias rate = ω/a₁,  mass scale = a₂/(1 + a₂),  impulse scale = 1/(1 + a₂)
-//!     λ' = max(λ − m (mass scale · vₙ + bias) − impulse scale · λ, 0)
+//! ```text
+//! a₁ = 2ζ + hω,  a₂ = hω·a₁,  bias rate = ω/a₁,  mass scale = a₂/(1 + a₂),  impulse scale = 1/(1 + a₂)
+//! λ' = max(λ − m (mass scale · vₙ + bias) − impulse scale · λ, 0)
+//! ```
 //!
 //! The spring is stiffer (45 Hz at four substeps of 60 Hz) and less damped (5) than the 30 Hz and 10 of the source: a tower of 40
 //! cubes then sags 9.6 mm at its foot rather than 21.7, and what is wedged into a heap 5 mm rather than 13. The limit is
