@@ -121,15 +121,18 @@ impl World {
 
     /// Makes the arbiter of a pair that begins to touch.
     fn begin_pair(&mut self, key: ArbiterKey, pair_index: u32, manifold: &Manifold) {
-        if self.arbiters.find(key).is_some() {
-            return; // a user holds this key: the shapes collide through that arbiter
-        }
         let pair = &self.pairs[pair_index as usize];
         let [b1, b2] = pair.bodies;
         let [center1, center2] = [b1, b2].map(|body| self.solver_bodies.masses[body as usize].pose());
         let between = center1.relative(&center2);
         let reusable = self.filters.contact.is_none();
-        let index = self.create_arbiter(key, self.body_id(b1), self.body_id(b2));
+        let ids = [self.body_id(b1), self.body_id(b2)];
+        let index = match self.arbiters.find(key) {
+            None => self.create_arbiter(key, ids[0], ids[1]),
+            // The user has made an arbiter under the key of these shapes: it is theirs from now on.
+            Some(index) if [self.arbiters.at(index).body1, self.arbiters.at(index).body2] == ids => index,
+            Some(_) => return, // a key that was not reserved, in use between other bodies
+        };
         self.arbiters.at_mut(index).pair = pair_index;
         let pair = &mut self.pairs[pair_index as usize];
         (pair.arbiter, pair.has_manifold, pair.manifold_pose) = (index, reusable, between);
