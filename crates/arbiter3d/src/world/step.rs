@@ -7,12 +7,11 @@ use super::id::BodyId;
 use super::timings::{Phase, PhaseClock};
 use crate::arbiter::{EndReason, NONE};
 use crate::math::{Aabb, Real, Vec3, min};
-use crate::parallel::SharedSlice;
+use crate::parallel::{BlockList, Gather, SharedSlice};
 use crate::solver::{
     IntegrateParameters, Pass, PassParameters, PrepareContext, Softness, StoreTarget, integrate_position,
     integrate_velocity,
 };
-use std::sync::Mutex;
 
 /// Bodies that a thread takes at a time.
 const BODIES_PER_BLOCK: usize = 128;
@@ -48,7 +47,7 @@ enum BodyNews {
 pub(crate) struct StepScratch {
     pairs: Vec<(u32, u32)>,
     may_break: Vec<bool>,
-    news: Vec<BodyNews>,
+    news: Gather<BodyNews>,
     moved: Vec<u32>,
     sorted_awake: Vec<u32>,
 }
@@ -253,9 +252,10 @@ impl World {
 
     /// New poses, boxes and rest times; then continuous collision for the fast.
     fn finalize(&mut self, dt: Real, report: &mut StepReport) {
-        let news = Mutex::new(std::mem::take(&mut self.scratch.news));
-        self.finalize_bodies(dt, &news);
-        let mut news = news.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut gather = std::mem::take(&mut self.scratch.news);
+        gather.prepare(self.pool.threads(), BODIES_PER_BLOCK);
+        self.finalize_bodies(dt, &gather);
+        let news = gather.list();
         // Threads report in any order; the trees and the report must not depend on it.
         news.sort_unstable_by_key(|item| match *item {
             BodyNews::Broken(body) => (0, body),
@@ -277,10 +277,10 @@ impl World {
                 }
             }
         }
-        self.scratch.news = news;
+        self.scratch.news = gather;
     }
 
-    fn finalize_bodies(&mut self, dt: Real, news: &Mutex<Vec<BodyNews>>) {
+    fn finalize_bodies(&mut self, dt: Real, news: &Gather<BodyNews>) {
         let awake = &self.scratch.sorted_awake;
         let world =
             FinalizeContext { shapes: &self.shapes, broad_phase: &self.broad_phase, settings: &self.scaled, dt };
@@ -289,16 +289,13 @@ impl World {
         let motions = SharedSlice::new(&mut self.solver_bodies.motions);
         let masses = SharedSlice::new(&mut self.solver_bodies.masses);
         self.pool.run(awake.len().div_ceil(BODIES_PER_BLOCK), |block| {
-            let mut found = Vec::new();
+            let mut found = news.block();
             for &index in block_of(awake, block) {
                 let at = index as usize;
                 // SAFETY: a body stands in the list once.
                 let (body, state, motion, mass) =
                     unsafe { (bodies.get_mut(at), states.get_mut(at), motions.get_mut(at), masses.get_mut(at)) };
                 world.finalize_body(index, (body, state, motion, mass), &mut found);
-            }
-            if !found.is_empty() {
-                news.lock().unwrap_or_else(std::sync::PoisonError::into_inner).append(&mut found);
             }
         });
     }
@@ -377,7 +374,7 @@ impl FinalizeContext<'_> {
             &mut crate::solver::BodyMotion,
             &mut crate::solver::BodyMass,
         ),
-        news: &mut Vec<BodyNews>,
+        news: &mut BlockList<'_, BodyNews>,
     ) {
         let center = mass.center + state.translation;
         let finite = center.is_finite()
@@ -410,7 +407,13 @@ impl FinalizeContext<'_> {
 
     /// Reports a shape whose box has left its fat box. Boxes of fast shapes reach ahead, so that what they will touch within
     /// the next step is found now.
-    fn update_box(&self, slot: u32, body: &super::bodies::Body, displacement: Vec3, news: &mut Vec<BodyNews>) {
+    fn update_box(
+        &self,
+        slot: u32,
+        body: &super::bodies::Body,
+        displacement: Vec3,
+        news: &mut BlockList<'_, BodyNews>,
+    ) {
         let shape = &self.shapes[slot as usize];
         let tight = shape.geometry.aabb(&body.pose.mul(&shape.pose));
         let speculative = self.settings.speculative_distance;
