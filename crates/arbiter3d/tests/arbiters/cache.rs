@@ -260,3 +260,28 @@ fn the_arbiter_ends_in_the_step_in_which_its_last_contact_breaks() {
     assert_eq!((ends.len(), ends[0].reason, ends[0].arbiter), (1, EndReason::Separated, id));
     assert_eq!(ends[0].data.usage_mask() >> 4, 1, "the contact that broke was solved in its last step");
 }
+
+/// Friction about the normal needs two points: what it carried must not go on to turn a body that is left with one.
+#[test]
+fn a_body_left_with_one_contact_is_not_turned_by_what_it_had_with_two() {
+    let mut world = World::default();
+    let body = add_bare(&mut world, Vec3::ZERO);
+    world.body_mut(body).unwrap().set_locked_axes(LockedAxes::ROTATION_X | LockedAxes::ROTATION_Z);
+    let id = world.get_or_create_arbiter(KEY, BodyId::WORLD, body).unwrap();
+    put(&mut world, id, Vec3::new(0.3, 0.0, 0.0), 0.0);
+    put(&mut world, id, Vec3::new(-0.3, 0.0, 0.0), 0.0);
+    for _ in 0..5 {
+        world.body_mut(body).unwrap().apply_torque(Vec3::new(0.0, 0.5, 0.0)).unwrap();
+        world.step(DT).unwrap();
+    }
+    assert!(world.body(body).unwrap().angular_velocity().y.abs() < 1e-3, "friction holds it");
+    world.arbiter_mut(id).unwrap().data_mut().remove_contact(1).unwrap();
+    for _ in 0..30 {
+        world.step(DT).unwrap();
+    }
+    assert!(
+        world.body(body).unwrap().angular_velocity().y.abs() < 1e-2,
+        "{}",
+        world.body(body).unwrap().angular_velocity()
+    );
+}
