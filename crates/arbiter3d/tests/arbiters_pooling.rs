@@ -56,7 +56,7 @@ impl ContactProvider for Points {
                 let contact = ContactPoint::new(ground, position, Vec3::Y);
                 let arbiter = context.register_contact_by_key(key, BodyId::WORLD, id, contact).unwrap();
                 context.arbiter_mut(arbiter).unwrap().data_mut().set_restitution(1.0).unwrap();
-                if (self.step + u64::from(id.index())) % 31 == 0 {
+                if (self.step + u64::from(id.index())).is_multiple_of(31) {
                     context.remove_arbiter(arbiter).unwrap();
                 }
             }

@@ -104,12 +104,12 @@ fn a_far_point_starts_without_impulses() {
 /// All slots full: the candidate whose removal leaves the largest quadrilateral goes, for each of the four.
 #[test]
 fn a_full_cache_gives_up_the_candidate_that_leaves_the_largest_area() {
-    for slot in 0..4 {
+    for (slot, corner) in RING.into_iter().enumerate() {
         let (mut world, _, id) = bare_world();
         for point in RING {
             put(&mut world, id, point, 0.0);
         }
-        let far = RING[slot] * 3.0;
+        let far = corner * 3.0;
         put(&mut world, id, far, 0.0);
         for (other, point) in slots(&world, id) {
             assert_eq!(point, if other == slot { far } else { RING[other] });
@@ -167,13 +167,13 @@ fn ties_go_to_the_lowest_slot_that_is_not_the_deepest() {
 /// PM1: a point of a full cache registered again leaves the four world points as they were.
 #[test]
 fn registering_a_point_of_a_full_cache_again_changes_nothing() {
-    for again in 0..4 {
+    for again in RING {
         let (mut world, _, id) = bare_world();
         for point in RING {
             put(&mut world, id, point, -0.1);
         }
         let before = slots(&world, id);
-        put(&mut world, id, RING[again], -0.1);
+        put(&mut world, id, again, -0.1);
         assert_eq!(slots(&world, id), before);
     }
 }
