@@ -13,11 +13,29 @@ mod run;
 mod scene_file;
 mod source;
 
+use arbiter3d_scenes::{BuiltScene, SceneOptions};
 use args::{Arguments, Command};
 use clap::Parser;
 use problem::Problem;
 use std::ffi::OsString;
+use std::path::Path;
 use std::process::ExitCode;
+
+/// Builds the world of a scene file (`docs/scene-format.md`), for tools and tests of one's own.
+///
+/// ```
+/// use arbiter3d_cli::load_scene;
+/// let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/hello.json");
+/// let mut scene = load_scene(&path, &Default::default())?;
+/// scene.step(0).map_err(|error| error.to_string())?;
+/// # Ok::<(), String>(())
+/// ```
+///
+/// # Errors
+/// The line that the command would print: what is wrong, and where.
+pub fn load_scene(path: &Path, options: &SceneOptions) -> Result<BuiltScene, String> {
+    scene_file::load(path, options).map(|loaded| loaded.scene).map_err(|problem| problem.line())
+}
 
 /// Runs the command with these arguments, of which the first is the program's name.
 ///

@@ -136,6 +136,12 @@ impl Mixed {
         ]))
     }
 
+    /// The same with balls and capsules that come to rest: without it they roll about for minutes.
+    pub fn resisting_to_roll(mut self) -> Self {
+        self.0.iter_mut().for_each(|shape| shape.material.rolling_resistance = 0.05);
+        self
+    }
+
     pub fn get(&self, index: usize) -> &ShapeDefinition {
         &self.0[index % 4]
     }

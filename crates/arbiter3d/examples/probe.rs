@@ -20,8 +20,31 @@ fn main() {
     }
     let mut sums = [0.0; 10];
     let t = std::time::Instant::now();
-    for _ in 0..steps {
+    for k in 0..steps {
         world.step(1.0 / 60.0).unwrap();
+        if steps > 250 && k % 50 == 49 {
+            let mut z = 0.0f32;
+            let mut tilt = [0.0f32; 3];
+            let mut vz = 0.0f32;
+            let mut vx = 0.0f32;
+            let mut wm = Vec3::ZERO;
+            for id in world.bodies().skip(1) {
+                let b = world.body(id).unwrap();
+                z = z.max(b.position().z.abs());
+                let q = b.rotation();
+                for (t, c) in tilt.iter_mut().zip([q.x, q.y, q.z]) {
+                    *t = t.max(c.abs());
+                }
+                vz = vz.max(b.linear_velocity().z.abs());
+                vx = vx.max(b.linear_velocity().x.abs());
+                wm = wm.max(b.angular_velocity().abs());
+            }
+            println!(
+                "{k} z {z:.4} tilt {tilt:.5?} vx {vx:.4} vz {vz:.4} w {wm:.4} ke {:.1} pen {:.4}",
+                world.kinetic_energy(),
+                world.deepest_penetration()
+            );
+        }
         for (i, (_, ms)) in world.timings().iter().enumerate() {
             sums[i] += ms;
         }

@@ -151,7 +151,7 @@ pub(crate) fn boxes_rain(options: &SceneOptions, size: usize) -> Result<BuiltSce
     let mut scene = Builder::new(options, size)?;
     tray(&mut scene, 8.0, 3.0)?;
     let mut random = scene.random(11);
-    let mixed = Mixed::new(&mut random)?;
+    let mixed = Mixed::new(&mut random)?.resisting_to_roll();
     for index in 0..scene.size {
         let (layer, x, z) = (index / 36, index / 6 % 6, index % 6);
         let corner = Vec3::new(x as Real - 2.5, layer as Real, z as Real - 2.5) * 2.0 + Vec3::new(0.0, 3.0, 0.0);

@@ -25,9 +25,12 @@ pub(crate) const SLOTS: usize = 4;
 pub struct Contact {
     pub(crate) local_anchor1: Vec3,
     pub(crate) local_anchor2: Vec3,
-    /// World normal from body 1 to body 2, as of the last step or registration.
+    /// The anchors in world axes as of when the manifold was made: the solver's levers. See `world::collide`.
+    pub(crate) arm1: Vec3,
+    pub(crate) arm2: Vec3,
+    /// World normal from body 1 to body 2, as of when the manifold was made or the contact was registered.
     pub(crate) normal: Vec3,
-    /// The normal in the axes of body 1: what the engine's contacts turn with between full updates.
+    /// The normal in the axes of body 1: what the engine's contacts turn with.
     pub(crate) local_normal: Vec3,
     pub(crate) separation: Real,
     /// Normal impulse of the last substep: what warm starting begins with.
@@ -39,7 +42,8 @@ pub struct Contact {
     pub(crate) feature: u32,
     /// Velocity parts that this contact leaves alone.
     pub(crate) remove: SolveMode,
-    /// Whether the normal keeps its world direction instead of turning with body 1: contacts that users registered.
+    /// Whether the normal keeps its world direction instead of turning with body 1, and the levers follow the bodies each
+    /// step: contacts that users registered.
     pub(crate) world_normal: bool,
 }
 

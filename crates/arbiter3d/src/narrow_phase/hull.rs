@@ -483,16 +483,27 @@ impl<'a> View<'a> {
         }
     }
 
-    /// The face of the other hull that looks most against `normal`.
+    /// Of the faces around the other hull's lowest corner, the one that looks most against `normal`.
+    ///
+    /// Among all faces it would be the wrong one where two faces meet almost flat: the one that looks straighter down may
+    /// end at the edge between them, with the deepest corner on the other one.
     fn incident_face(&self, normal: Vec3) -> usize {
         let n = Vec3::new(self.m.x_axis.dot(normal), self.m.y_axis.dot(normal), self.m.z_axis.dot(normal));
+        let mut lowest = 0;
+        let mut height = self.other.vertices[0].dot(n);
+        for (vertex, position) in self.other.vertices.iter().enumerate().skip(1) {
+            let h = position.dot(n);
+            if h < height {
+                (lowest, height) = (vertex, h);
+            }
+        }
         let mut best = 0;
-        let mut cosine = self.other.planes[0].normal.dot(n);
-        for (face, plane) in self.other.planes.iter().enumerate().skip(1) {
-            let c = plane.normal.dot(n);
+        let mut cosine = Real::MAX;
+        for edge in self.other.edges.iter().filter(|edge| edge.origin as usize == lowest) {
+            let c = self.other.planes[edge.face as usize].normal.dot(n);
             // Clearly more, so that of two faces at the same angle the first one stays.
             if c < cosine - 1e-3 {
-                (best, cosine) = (face, c);
+                (best, cosine) = (edge.face as usize, c);
             }
         }
         best

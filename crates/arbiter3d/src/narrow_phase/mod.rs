@@ -28,7 +28,7 @@ mod triangle;
 mod triangle_solid;
 
 pub(crate) use distance::Support;
-pub(crate) use time_of_impact::{Sweep, time_of_impact};
+pub(crate) use time_of_impact::{Sweep, gap, time_of_impact};
 
 pub use manifold::{Manifold, ManifoldPoint};
 

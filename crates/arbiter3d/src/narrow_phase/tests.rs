@@ -644,3 +644,31 @@ fn shapes_apart_tell_their_distance() {
     }
     assert!(apart > 1000 && lost == 0 && early * 50 < apart && late * 50 < apart, "{apart} {lost} {early} {late}");
 }
+
+/// A rock in the ground touches it with its lowest corner, also where two of its faces meet almost flat and the one that
+/// looks straighter down ends before that corner.
+#[test]
+fn the_deepest_corner_is_in_the_manifold() {
+    let mut random = Random(77);
+    let corner = |x: Real, z: Real| Vec3::new(50.0 * x, 50.0, 50.0 * z);
+    let square = vec![corner(-1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0), corner(1.0, -1.0)];
+    let grounds = [Shape::cuboid(Vec3::splat(50.0)).unwrap(), Shape::mesh(square, vec![[0, 1, 2], [0, 2, 3]]).unwrap()];
+    // A prism whose side is bent by a third of a degree, and rocks.
+    let bent = [(0.5, -0.35, 0.0), (-0.25, -0.35, 0.43), (-0.25, -0.35, -0.43), (0.3, 0.4, 0.0), (-0.15, 0.4, 0.26)];
+    let mut hulls = vec![Shape::hull(&bent.map(|(x, y, z)| Vec3::new(x, y, z))).unwrap()];
+    for count in 6..20 {
+        hulls.push(Shape::hull(&(0..count).map(|_| random.direction() * 0.5).collect::<Vec<_>>()).unwrap());
+    }
+    for round in 0..3000 {
+        let shape = &hulls[round % hulls.len()];
+        let Shape::Hull(hull) = shape else { unreachable!() };
+        let rotation = random.rotation();
+        let low = hull.vertices().iter().map(|&v| rotation.rotate(v).y).fold(Real::MAX, Real::min);
+        let depth = random.between(0.0, 0.1);
+        let position = Vec3::new(random.between(-5.0, 5.0), 50.0 - low - depth, random.between(-5.0, 5.0));
+        for ground in &grounds {
+            let found = lowest(&contacts(ground, shape, &Pose::new(position, rotation), 0.02));
+            assert!((found + depth).abs() < 1e-4, "round {round}: {found}, the corner is at {}", -depth);
+        }
+    }
+}

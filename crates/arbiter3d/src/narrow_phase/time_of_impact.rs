@@ -130,6 +130,11 @@ pub(crate) fn time_of_impact(
     Some(t)
 }
 
+/// Gap of two shapes, `pose` placing shape 2 in the frame of shape 1; zero or less where they overlap.
+pub(crate) fn gap(shape1: &Support, shape2: &Support, pose: &Pose) -> Real {
+    closest(shape1, shape2, pose).map_or(-1.0, |found| found.distance - shape1.radius() - shape2.radius())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

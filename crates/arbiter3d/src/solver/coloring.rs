@@ -102,13 +102,7 @@ impl RowPlan {
             let mut slots = 0;
             for slot in 0..SLOTS {
                 let contact = &data.slots[slot];
-                let same = contact.world_normal == lead.world_normal
-                    && contact.remove == lead.remove
-                    && if lead.world_normal {
-                        contact.normal == lead.normal
-                    } else {
-                        contact.local_normal == lead.local_normal
-                    };
+                let same = contact.remove == lead.remove && contact.normal == lead.normal;
                 slots |= u8::from(same && left >> slot & 1 == 1) << slot;
             }
             // A normal that is not equal to itself cannot occur (validated), but must not loop.

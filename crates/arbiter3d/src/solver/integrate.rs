@@ -91,7 +91,7 @@ pub(crate) fn integrate_position(
     if motion.gyroscopic && angle.length_squared() > GYROSCOPIC_TURN * GYROSCOPIC_TURN {
         let (mean, end) = spin(mass.rotation, state.angular_velocity, h, motion);
         // The change is free motion, not a contact's doing.
-        motion.free_angular += end - state.angular_velocity;
+        motion.free_angular = end - (state.angular_velocity - motion.free_angular);
         state.angular_velocity = end;
         angle = mean * h;
     }
@@ -105,8 +105,11 @@ pub(crate) fn integrate_position(
 fn spin(rotation: Rotation, angular_velocity: Vec3, h: Real, motion: &BodyMotion) -> (Vec3, Vec3) {
     let through = |q: Rotation, m: &SymmetricMat3, v: Vec3| q.rotate(m.mul(q.inverse_rotate(v)));
     let momentum = through(rotation, &motion.inertia, angular_velocity);
-    let half_way = rotation.integrate(angular_velocity * (0.5 * h));
-    let mean = through(half_way, &motion.inverse_inertia, momentum);
-    let end = rotation.integrate(mean * h);
-    (mean, through(end, &motion.inverse_inertia, momentum))
+    // ω' = ω + I'⁻¹ (L − I' ω) rather than I'⁻¹ L: rounding then errs by a share of the change, not of the whole.
+    let at = |q: Rotation| {
+        let missing = momentum - through(q, &motion.inertia, angular_velocity);
+        angular_velocity + through(q, &motion.inverse_inertia, missing)
+    };
+    let mean = at(rotation.integrate(angular_velocity * (0.5 * h)));
+    (mean, at(rotation.integrate(mean * h)))
 }

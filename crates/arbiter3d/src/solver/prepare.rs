@@ -1,8 +1,8 @@
 //! From arbiters to wide rows, and back.
 //!
 //! Each lane's numbers are gathered from its arbiter, then all lanes compute together. With `q₁, q₂` the rotations and
-//! `c₁, c₂` the centres of mass, a point has `rₖ = qₖ · anchorₖ`, the gap `n · ((c₂ + r₂) − (c₁ + r₁))`, and the response
-//! between points `i` and `j`
+//! `c₁, c₂` the centres of mass, a point has the gap `n · ((c₂ + q₂ anchor₂) − (c₁ + q₁ anchor₁))`, levers `rₖ` (the anchors
+//! as they were turned when the manifold was made), and the response between points `i` and `j`
 //!
 //!     Aᵢⱼ = n·(M₁⁻¹ + M₂⁻¹)n + (r₁ⱼ×n)·I₁⁻¹(r₁ᵢ×n) + (r₂ⱼ×n)·I₂⁻¹(r₂ᵢ×n)
 //!
@@ -26,10 +26,10 @@ pub(crate) struct PrepareContext<'a> {
 
 /// Poses and anchors of a wide row while it is prepared.
 struct Gathered<const L: usize, const P: usize> {
-    /// From centre 1 to centre 2.
-    between: WideVec3<L>,
     r1: [WideVec3<L>; P],
     r2: [WideVec3<L>; P],
+    /// From anchor 1 to anchor 2, as the bodies stand now.
+    apart: [WideVec3<L>; P],
     /// 1 where the lane has the point, else 0.
     present: [Wide<L>; P],
 }
@@ -45,13 +45,13 @@ pub(crate) fn prepare_row<const L: usize, const P: usize, const C: usize>(
     *row = NormalRow::EMPTY;
     *friction = FrictionRow::EMPTY;
     let mut gathered = Gathered {
-        between: WideVec3::ZERO,
         r1: [WideVec3::ZERO; P],
         r2: [WideVec3::ZERO; P],
+        apart: [WideVec3::ZERO; P],
         present: [Wide::ZERO; P],
     };
     for (lane, source) in sources.iter().enumerate().take(L) {
-        gather_bodies(row, &mut gathered, lane, source, context);
+        gather_bodies(row, lane, source, context);
         gather_points(row, friction, &mut gathered, lane, source, context);
     }
     let separations = prepare_normals(row, &gathered);
@@ -68,7 +68,6 @@ pub(crate) fn prepare_row<const L: usize, const P: usize, const C: usize>(
 #[inline(always)]
 fn gather_bodies<const L: usize, const P: usize, const C: usize>(
     row: &mut NormalRow<L, P, C>,
-    gathered: &mut Gathered<L, P>,
     lane: usize,
     source: &RowSource,
     context: &PrepareContext<'_>,
@@ -81,9 +80,7 @@ fn gather_bodies<const L: usize, const P: usize, const C: usize>(
     let read_only = |body: u32| if context.bodies.states[body as usize].moves != 0 { body } else { body | READ_ONLY };
     row.body1[lane] = read_only(b1);
     row.body2[lane] = read_only(b2);
-    let normal = if lead.world_normal { lead.normal } else { m1.rotation.rotate(lead.local_normal) };
-    row.normal.set(lane, normal);
-    gathered.between.set(lane, m2.center - m1.center);
+    row.normal.set(lane, lead.normal);
     if mode.contains(SolveMode::LINEAR_BODY1) {
         row.inverse_mass1.set(lane, m1.inverse_mass);
     }
@@ -120,14 +117,17 @@ fn gather_points<const L: usize, const P: usize, const C: usize>(
 ) {
     let arbiter = &context.arbiters[source.arbiter as usize];
     let data = &arbiter.data;
-    let q1 = context.bodies.masses[arbiter.body1.index as usize].rotation;
-    let q2 = context.bodies.masses[arbiter.body2.index as usize].rotation;
+    let m1 = &context.bodies.masses[arbiter.body1.index as usize];
+    let m2 = &context.bodies.masses[arbiter.body2.index as usize];
     let mut point = 0;
     for slot in 0..SLOTS {
         if source.slots >> slot & 1 == 1 && point < P {
             let contact = &data.slots[slot];
-            gathered.r1[point].set(lane, q1.rotate(contact.local_anchor1));
-            gathered.r2[point].set(lane, q2.rotate(contact.local_anchor2));
+            let (r1, r2) = (m1.rotation.rotate(contact.local_anchor1), m2.rotation.rotate(contact.local_anchor2));
+            let fresh = contact.world_normal;
+            gathered.r1[point].set(lane, if fresh { r1 } else { contact.arm1 });
+            gathered.r2[point].set(lane, if fresh { r2 } else { contact.arm2 });
+            gathered.apart[point].set(lane, (m2.center - m1.center) + (r2 - r1));
             gathered.present[point][lane] = 1.0;
             row.impulses[point][lane] = contact.normal_impulse;
             point += 1;
@@ -169,7 +169,7 @@ fn prepare_normals<const L: usize, const P: usize, const C: usize>(
     for i in 0..P {
         let arm1 = gathered.r1[i].cross(&n);
         let arm2 = gathered.r2[i].cross(&n);
-        let gap = (gathered.between + gathered.r2[i] - gathered.r1[i]).dot(&n);
+        let gap = gathered.apart[i].dot(&n);
         turned1[i] = row.inverse_inertia1.mul(&arm1);
         turned2[i] = row.inverse_inertia2.mul(&arm2);
         let response = linear + arm1.dot(&turned1[i]) + arm2.dot(&turned2[i]);
@@ -214,8 +214,7 @@ fn prepare_friction<const L: usize, const P: usize, const C: usize>(
     for i in 0..P {
         let away = gathered.r1[i] - r1;
         friction.levers[i] = away.dot(&away).sqrt() * gathered.present[i];
-        let apart = gathered.between + gathered.r2[i] - gathered.r1[i];
-        let sideways = apart.sub_scaled(&row.normal, separations[i]);
+        let sideways = gathered.apart[i].sub_scaled(&row.normal, separations[i]);
         friction.drift = friction.drift.max((sideways.dot(&sideways) * gathered.present[i]).sqrt());
     }
     let (t1, t2) = wide_tangents(&row.normal);

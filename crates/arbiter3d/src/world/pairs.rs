@@ -7,7 +7,7 @@
 use super::World;
 use super::definition::BodyKind;
 use crate::arbiter::{EndReason, NONE};
-use crate::math::{Pose, Real, max, min};
+use crate::math::{Pose, Real, Rotation, max, min};
 use crate::narrow_phase::PairCache;
 
 /// What the world keeps of a pair. Shape 1 has the smaller id.
@@ -27,6 +27,8 @@ pub(crate) struct Pair {
     pub has_manifold: bool,
     /// Centre frame of body 2 seen from that of body 1 when the manifold was made.
     pub manifold_pose: Pose,
+    /// How body 1 was turned when the manifold's normal and levers were put into world axes.
+    pub manifold_rotation: Rotation,
     /// How far the pair may move (metres) before its manifold is made anew.
     reuse_distance: Real,
     pub cache: PairCache,
@@ -35,9 +37,9 @@ pub(crate) struct Pair {
 }
 
 /// How far a pair may move, in shares of the smaller shape's inner radius, before its manifold is made anew.
-const REUSE_TRANSLATION: Real = 0.002;
-/// How far a pair may turn (sine of half the angle) before its manifold is made anew: 0.3°.
-const REUSE_ROTATION: Real = 0.0025;
+const REUSE_TRANSLATION: Real = 0.02;
+/// How far a pair may turn (sine of half the angle) before its manifold is made anew: 1.4°.
+const REUSE_ROTATION: Real = 0.0125;
 
 impl Pair {
     /// Whether the pair is so nearly where its manifold was made that the manifold may stay.
@@ -50,6 +52,13 @@ impl Pair {
         let turned = old.rotation.conjugate().mul(between.rotation).vector();
         moved.length_squared() < self.reuse_distance * self.reuse_distance
             && turned.length_squared() < REUSE_ROTATION * REUSE_ROTATION
+    }
+
+    /// Whether body 1 has turned so little that normal and levers may stay as they are.
+    #[inline(always)]
+    pub fn hardly_turned(&self, rotation1: Rotation) -> bool {
+        let turned = self.manifold_rotation.conjugate().mul(rotation1).vector();
+        turned.length_squared() < REUSE_ROTATION * REUSE_ROTATION
     }
 
     pub fn has_shape(&self, slot: u32) -> bool {
@@ -88,6 +97,7 @@ impl World {
             overlapping: false,
             has_manifold: false,
             manifold_pose: Pose::IDENTITY,
+            manifold_rotation: Rotation::IDENTITY,
             reuse_distance: self.reuse_distance(shapes),
             cache: PairCache::default(),
             next: [NONE; 2],

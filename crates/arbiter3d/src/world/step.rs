@@ -172,10 +172,14 @@ impl World {
         let settings = self.scaled;
         let substep = dt / settings.substeps as Real;
         let hertz = min(settings.contact_hertz, 0.125 / substep);
+        // Against the ground twice as stiff: what stands on it has the weight of all above. And so for deep overlaps.
+        let stiff = Softness::new(2.0 * hertz, 0.5 * settings.contact_damping_ratio, substep);
         let pass = |softness: Softness| PassParameters {
             inverse_substep: 1.0 / substep,
             push_out_speed: settings.push_out_speed,
             softness,
+            deep_softness: stiff,
+            slop: settings.slop,
             restitution_threshold: settings.restitution_threshold,
         };
         // Against the ground twice as stiff: what stands on it has the weight of all above.
