@@ -49,7 +49,10 @@ pub(crate) struct StepScratch {
     may_break: Vec<bool>,
     news: Gather<BodyNews>,
     moved: Vec<u32>,
+    /// Bodies that this step integrates.
     sorted_awake: Vec<u32>,
+    /// Memory for the list with the woken ones.
+    admitted: Vec<u32>,
 }
 
 impl StepScratch {
@@ -73,13 +76,14 @@ impl World {
         let mut clock = PhaseClock::start();
         self.events.begin_step();
         self.flush_events();
-        self.apply_forces(dt);
+        self.apply_forces();
         self.find_pairs();
         clock.mark(Phase::BroadPhase);
         self.collide_pairs(dt);
         self.call_providers();
         clock.mark(Phase::NarrowPhase);
         self.raise_begin();
+        self.admit_woken();
         clock.mark(Phase::BeginEvents);
         self.plan_rows();
         clock.mark(Phase::Coloring);
@@ -105,25 +109,49 @@ impl World {
         Ok(report)
     }
 
-    /// Turns gravity and forces into this step's accelerations.
-    fn apply_forces(&mut self, dt: Real) {
-        self.scratch.sorted_awake.clone_from(&self.awake);
-        self.scratch.sorted_awake.sort_unstable();
-        let gravity = self.settings.gravity;
-        for &index in &self.scratch.sorted_awake {
-            let body = &mut self.bodies[index as usize];
-            let motion = &mut self.solver_bodies.motions[index as usize];
-            let mass = &self.solver_bodies.masses[index as usize];
-            let (free, _) = body.locked_axes.free();
-            let dynamic = !motion.kinematic && !body.frozen;
-            motion.acceleration =
-                if dynamic { gravity * body.gravity_scale * free + mass.inverse_mass * body.force } else { Vec3::ZERO };
-            motion.angular_acceleration = if dynamic { mass.inverse_inertia.mul(body.torque) } else { Vec3::ZERO };
-            (body.force, body.torque) = (Vec3::ZERO, Vec3::ZERO);
-            let state = &mut self.solver_bodies.states[index as usize];
-            (state.translation, state.turn, state.constrained) = (Vec3::ZERO, Vec3::ZERO, 0);
+    /// Lists the awake bodies and turns gravity and their forces into this step's accelerations.
+    fn apply_forces(&mut self) {
+        let mut list = std::mem::take(&mut self.scratch.sorted_awake);
+        list.clone_from(&self.awake);
+        list.sort_unstable();
+        for &index in &list {
+            self.accelerate(index);
         }
-        let _ = dt;
+        self.scratch.sorted_awake = list;
+        self.awake_changed = false;
+    }
+
+    /// Lets bodies that contacts have woken take part in the step in full, and drops those that listeners have removed. What
+    /// is solved but not integrated would lose the impulses that it is warm started with.
+    fn admit_woken(&mut self) {
+        if !std::mem::take(&mut self.awake_changed) {
+            return;
+        }
+        let mut list = std::mem::take(&mut self.scratch.admitted);
+        list.clone_from(&self.awake);
+        list.sort_unstable();
+        for &index in &list {
+            if self.scratch.sorted_awake.binary_search(&index).is_err() {
+                self.accelerate(index);
+            }
+        }
+        std::mem::swap(&mut list, &mut self.scratch.sorted_awake);
+        self.scratch.admitted = list;
+    }
+
+    /// Turns gravity and the forces on a body into its accelerations, and starts its motion of this step at zero.
+    fn accelerate(&mut self, index: u32) {
+        let body = &mut self.bodies[index as usize];
+        let motion = &mut self.solver_bodies.motions[index as usize];
+        let mass = &self.solver_bodies.masses[index as usize];
+        let (free, _) = body.locked_axes.free();
+        let dynamic = !motion.kinematic && !body.frozen;
+        let gravity = self.settings.gravity * body.gravity_scale * free;
+        motion.acceleration = if dynamic { gravity + mass.inverse_mass * body.force } else { Vec3::ZERO };
+        motion.angular_acceleration = if dynamic { mass.inverse_inertia.mul(body.torque) } else { Vec3::ZERO };
+        (body.force, body.torque) = (Vec3::ZERO, Vec3::ZERO);
+        let state = &mut self.solver_bodies.states[index as usize];
+        (state.translation, state.turn, state.constrained) = (Vec3::ZERO, Vec3::ZERO, 0);
     }
 
     /// Finds the pairs of shapes that have moved.

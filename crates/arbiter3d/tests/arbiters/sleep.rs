@@ -114,3 +114,46 @@ fn sleep_waits_for_the_whole_island() {
     steps(&mut world, 90);
     assert!(!awake(&world, box_) && !awake(&world, ball));
 }
+
+/// Where two balls are 10 steps after one has hit the other, which was asleep or just lay there.
+fn billiards(asleep: bool, custom: bool) -> [Vec3; 2] {
+    let mut world = weightless();
+    let ball = Shape::sphere(0.5).unwrap();
+    let (target, _) = add(&mut world, Vec3::ZERO, ball.clone());
+    if asleep {
+        world.body_mut(target).unwrap().sleep();
+        assert!(!awake(&world, target));
+    }
+    let (cue, shape) = add(&mut world, Vec3::new(-1.01, 0.0, 0.0), ball);
+    world.body_mut(cue).unwrap().set_linear_velocity(Vec3::new(12.0, 0.0, 0.0)).unwrap();
+    if custom {
+        // The same contact, from a provider.
+        world.shape_mut(shape).unwrap().set_filter(Filter { mask: 0, ..Filter::default() });
+        let mut once = Some(ContactPoint::new(Vec3::new(-0.51, 0.0, 0.0), Vec3::new(-0.5, 0.0, 0.0), Vec3::X));
+        world.add_contact_provider(Box::new(Provide(move |context: &mut StepContext<'_>| {
+            if let Some(contact) = once.take() {
+                context.register_contact_by_key(ArbiterKey::new(900, 900), cue, target, contact).unwrap();
+            }
+        })));
+    }
+    steps(&mut world, 10);
+    assert!(awake(&world, target));
+    [cue, target].map(|body| world.body(body).unwrap().position())
+}
+
+/// A provider from a closure.
+struct Provide<F>(F);
+
+impl<F: FnMut(&mut StepContext<'_>) + Send + Sync> ContactProvider for Provide<F> {
+    fn provide(&mut self, context: &mut StepContext<'_>) {
+        (self.0)(context);
+    }
+}
+
+/// What wakes in the middle of a step takes part in it in full: to be hit asleep or awake makes no difference.
+#[test]
+fn a_body_hit_in_its_sleep_moves_as_if_it_had_been_awake() {
+    for custom in [false, true] {
+        assert_eq!(billiards(true, custom), billiards(false, custom), "custom {custom}");
+    }
+}
