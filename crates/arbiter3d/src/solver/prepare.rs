@@ -270,7 +270,8 @@ fn warm_friction<const L: usize, const P: usize, const C: usize>(
     let (t1, t2) = (friction.tangent1.get(lane), friction.tangent2.get(lane));
     friction.impulse1[lane] = tangential.dot(t1);
     friction.impulse2[lane] = tangential.dot(t2);
-    friction.twist_impulse[lane] = twist;
+    // One point has no lever and solves no twist: what an arbiter of more points has left of it must not act on.
+    friction.twist_impulse[lane] = if P == 1 { 0.0 } else { twist };
     friction.target1[lane] = data.tangent_velocity.dot(t1);
     friction.target2[lane] = data.tangent_velocity.dot(t2);
     let _ = row;
