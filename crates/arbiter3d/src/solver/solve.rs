@@ -11,7 +11,7 @@
 //! λ' = max(λ − m (mass scale · vₙ + bias) − impulse scale · λ, 0)
 //! ```
 //!
-//! The spring is stiffer (45 Hz at four substeps of 60 Hz) and less damped (5) than the 30 Hz and 10 of the source: a tower of 40
+//! The spring is stiffer (45 Hz at four substeps of 60 Hz) and less damped (3) than the 30 Hz and 10 of the source: a tower of 40
 //! cubes then sags 9.6 mm at its foot rather than 21.7, and what is wedged into a heap 5 mm rather than 13. The limit is
 //! 0.1875 of the substep rate; at 60 Hz a triangle of 100 rows rings.
 //!

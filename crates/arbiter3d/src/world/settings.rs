@@ -31,7 +31,7 @@ pub struct WorldSettings {
     pub contact_break_distance: Real,
     /// Stiffness of contacts, Hz; limited to 0.1875 of the substep rate. Default 45.
     pub contact_hertz: Real,
-    /// Damping ratio of contacts. Default 5.
+    /// Damping ratio of contacts. Default 3.
     pub contact_damping_ratio: Real,
     /// Speed limit at which overlapping bodies are pushed apart. Default 3 m/s.
     pub push_out_speed: Real,
@@ -63,7 +63,7 @@ impl Default for WorldSettings {
             speculative_distance: 0.02,
             contact_break_distance: 0.02,
             contact_hertz: 45.0,
-            contact_damping_ratio: 5.0,
+            contact_damping_ratio: 3.0,
             push_out_speed: 3.0,
             restitution_threshold: 1.0,
             max_linear_speed: 1000.0,
