@@ -5,8 +5,8 @@
 //! however many triangles the box lies on: a corner of a right angle is extreme along at least one of eight directions.
 //!
 //! At the end the groups are merged, nearest normals first, until there are at most four. Every group gives its deepest
-//! point; the remaining places go where they add most: the square of a length for the second point of a group, twice
-//! the area for the third and the fourth. So a box on a floor keeps its four corners, a box in a groove two on each side.
+//! point; the remaining places go where they add most, points that touch before those that do not: the square of a length
+//! for the second point of a group, twice the area for the third and the fourth. So a box on a floor keeps its four corners, a box in a groove two on each side.
 
 use crate::math::{Real, Vec3, tangents};
 
@@ -38,6 +38,9 @@ const EQUALLY_DEEP: Real = 0.02;
 /// Another choice must be better by this share, so that rounding does not swap equal ones from step to step.
 const TIE: Real = 1.000_001;
 
+/// A point that touches goes before one that stands off (the ends of a ridge before the corners that lean over it) if
+/// it adds at least this share of what that would.
+const BEARING_SHARE: Real = 0.05;
 /// A group stands off that is farther than the nearest by this many tolerances.
 const STANDS_OFF: Real = 2.5;
 /// A fourth point that adds less to the area of three than this share is not worth moving one for.
@@ -99,10 +102,16 @@ impl Candidates {
         for group in 0..groups.count {
             chosen.add(group, self.deepest_of(&groups, group));
         }
-        let touching = self.touching(&chosen, groups.count);
+        let (touching, limit) = self.touching(&chosen, groups.count);
         for _ in groups.count..4 {
-            let useful = self.most_useful(&groups, &chosen, touching);
-            let Some((group, index, _)) = useful.or_else(|| self.most_useful(&groups, &chosen, ALL_GROUPS)) else { break };
+            let bearing = self.most_useful(&groups, &chosen, touching, limit);
+            let widest = self.most_useful(&groups, &chosen, touching, Real::MAX);
+            let next = match (bearing, widest) {
+                (Some(bearing), Some(widest)) if bearing.2 >= BEARING_SHARE * widest.2 => Some(bearing),
+                (_, Some(widest)) => Some(widest),
+                _ => self.most_useful(&groups, &chosen, ALL_GROUPS, Real::MAX),
+            };
+            let Some((group, index, _)) = next else { break };
             chosen.add(group, index);
         }
         for group in 0..groups.count {
@@ -116,13 +125,13 @@ impl Candidates {
         }
     }
 
-    /// The groups that come about as near as the nearest one, a bit for each: what stands off (a wall beside a box on a
-    /// floor) bears nothing yet, and one point is enough to stop at it.
-    fn touching(&self, chosen: &Chosen, groups: usize) -> u8 {
+    /// The groups that come about as near as the nearest one, a bit for each, and the separation up to which points do:
+    /// what stands off (a wall beside a box on a floor) bears nothing yet, and one point is enough to stop at it.
+    fn touching(&self, chosen: &Chosen, groups: usize) -> (u8, Real) {
         let nearest = |group: usize| self.list[chosen.points[group][0]].separation;
         let least = (0..groups).fold(Real::MAX, |m, group| crate::math::min(m, nearest(group)));
         let limit = crate::math::max(least, 0.0) + STANDS_OFF * self.tolerance;
-        (0..groups).filter(|&group| nearest(group) <= limit).fold(0, |mask, group| mask | 1 << group)
+        ((0..groups).filter(|&group| nearest(group) <= limit).fold(0, |mask, group| mask | 1 << group), limit)
     }
 
     /// Where only three places were left for a patch of four corners, the middle between the fourth and its nearest
@@ -133,7 +142,7 @@ impl Candidates {
         }
         let [a, b, c] = [0, 1, 2].map(|k| &self.list[chosen.points[group][k]]);
         let area = groups.normals[group].dot((b.position - a.position).cross(c.position - a.position)).abs();
-        let (_, fourth, gain) = self.most_useful(groups, chosen, 1 << group)?;
+        let (_, fourth, gain) = self.most_useful(groups, chosen, 1 << group, Real::MAX)?;
         let fourth = &self.list[fourth];
         if gain < WORTH_WIDENING * area {
             return None;
@@ -217,13 +226,13 @@ impl Candidates {
         best.0
     }
 
-    /// The point that adds most to its group, of the groups in the bit mask: group, index and gain.
-    fn most_useful(&self, groups: &Groups, chosen: &Chosen, mask: u8) -> Option<(usize, usize, Real)> {
+    /// The point up to `limit` that adds most to its group, of the groups in the bit mask: group, index and gain.
+    fn most_useful(&self, groups: &Groups, chosen: &Chosen, mask: u8, limit: Real) -> Option<(usize, usize, Real)> {
         let mut best = None;
         let mut most = self.tolerance * self.tolerance;
         for (i, candidate) in self.list[..self.count].iter().enumerate() {
             let group = groups.of[i] as usize;
-            if mask >> group & 1 == 0 {
+            if mask >> group & 1 == 0 || candidate.separation > limit {
                 continue;
             }
             let corners = chosen.points[group].map(|j| self.list[j].position);
