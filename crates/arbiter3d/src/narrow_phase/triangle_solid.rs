@@ -285,7 +285,8 @@ impl Pair<'_> {
     fn touch_face(&self, wanted: &FacePoints, out: &mut Candidates) -> usize {
         let triangle = self.triangle;
         let seams = !self.reach.second_look;
-        let left_out = |cut: u32| seams && triangle.is_seam(cut) || !wanted.rims && triangle.edge_is_sharp(cut as usize);
+        let left_out =
+            |cut: u32| seams && triangle.is_seam(cut) || !wanted.rims && triangle.edge_is_sharp(cut as usize);
         let mut points = 0;
         let Underside { face, center, radius, .. } = *self.underside;
         if triangle.insides(center).iter().any(|inside| *inside < -radius) {
