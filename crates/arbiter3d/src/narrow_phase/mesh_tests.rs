@@ -1,7 +1,7 @@
 //! Mesh contacts against planes, grooves, ridges and corners whose contacts are known, and against brute force.
 
 use super::*;
-use crate::math::Rotation;
+use crate::math::{Rotation, max, min};
 use crate::shape::ShapeError;
 
 /// Numbers from a linear congruential generator, in `[-1, 1)`.
@@ -576,5 +576,89 @@ fn unlike_tiles_make_one_floor() {
             assert!(manifold.points().iter().all(|p| p.normal == Vec3::Y), "{shape:?} {pose:?} {manifold:?}");
             assert!(manifold.points().iter().any(|p| (p.separation + 0.005).abs() < 1e-5));
         }
+    }
+}
+
+/// A floor of fans of slivers a tenth of the shape's size wide: shapes pushed in as deep as a fast landing leaves them keep
+/// their deepest point, and go straight up.
+#[test]
+fn deep_shapes_on_slivers_keep_their_deepest_point() {
+    let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+    // Each strip of 4 m × 6 m is a fan about a corner of its own, whose other side is cut finely.
+    for strip in 0..2 {
+        let (first, left) = (vertices.len() as u32, 4.0 * strip as Real - 4.0);
+        vertices.push(Vec3::new(left, 0.0, -3.0));
+        vertices.extend((0..=100).map(|i| Vec3::new(left + 4.0, 0.0, -3.0 + 0.06 * i as Real)));
+        vertices.push(Vec3::new(left, 0.0, 3.0));
+        triangles.extend((1..=101).map(|i| [first, first + i + 1, first + i]));
+    }
+    let mesh = TriangleMesh::new(vertices, triangles).unwrap();
+    let mut random = Random(83);
+    for shape in some_shapes().unwrap() {
+        for round in 0..400 {
+            let mut pose = Pose::new(Vec3::new(random.next(), 0.0, random.next()), random.rotation());
+            let depth = 0.9 * shape.inner_radius() * (round % 10) as Real / 10.0;
+            pose.position.y = -lowest(&shape, &pose) - depth;
+            let manifold = touch(&mesh, &shape, &pose);
+            assert!(manifold.points().iter().all(|p| p.normal == Vec3::Y), "{shape:?} {pose:?} {manifold:?}");
+            let deepest = manifold.points().iter().fold(Real::MAX, |m, p| min(m, p.separation));
+            assert!((deepest + depth).abs() < 1e-4, "{shape:?} {pose:?}: {deepest}, not {depth} deep");
+        }
+    }
+}
+
+/// A box on a floor beside a wall of the same mesh, nearer than the margin: the floor's points alone hold it up however it
+/// is tipped by rounding, so its middle is well inside of them.
+#[test]
+fn a_box_beside_a_wall_stands_on_the_floor() {
+    let mut vertices: Vec<Vec3> = vec![];
+    let mut triangles = vec![];
+    for quad in [[[-5, 0, -5], [-5, 0, 5], [5, 0, -5], [5, 0, 5]], [[0, 0, 5], [0, 3, 5], [0, 0, -5], [0, 3, -5]]] {
+        let first = vertices.len() as u32;
+        vertices.extend(quad.map(|corner: [i8; 3]| Vec3::from(corner.map(Real::from))));
+        triangles.extend([[first, first + 1, first + 2], [first + 2, first + 1, first + 3]]);
+    }
+    let mesh = TriangleMesh::with_sides(vertices, triangles, MeshSides::Two).unwrap();
+    let half = Vec3::new(0.3, 0.5, 0.4);
+    let shape = Shape::cuboid(half).unwrap();
+    for tip in [0.0, 0.002, -0.002, 0.004, -0.004] {
+        for gap in [0.002, 0.004, 0.008, 0.015] {
+            let turn = Rotation::from_xyzw(tip, 0.0, 0.5 * tip, 1.0).normalize();
+            let mut pose = Pose::new(Vec3::new(half.x + gap + tip.abs(), 0.0, 0.3), turn);
+            pose.position.y = -lowest(&shape, &pose);
+            let manifold = touch(&mesh, &shape, &pose);
+            let floor: Vec<Vec3> = manifold.points().iter().filter(|p| p.normal.y > 0.9).map(|p| p.point1).collect();
+            for k in 0..64 {
+                let outwards = Vec3::new(libm::cosf(0.098_174_8 * k as Real), 0.0, libm::sinf(0.098_174_8 * k as Real));
+                let reach = floor.iter().fold(-Real::MAX, |m, p| max(m, outwards.dot(*p - pose.position)));
+                assert!(reach > 0.05, "tip {tip}, gap {gap}: falls to {outwards}: {floor:?}");
+            }
+        }
+    }
+}
+
+/// A box that leans a little over the rim of a ledge bears on both ends of the stretch of rim under it.
+#[test]
+fn a_rim_bears_at_both_ends() {
+    let mesh = block(Vec3::new(5.0, 1.0, 5.0), 1);
+    let half = Vec3::new(0.4, 0.3, 0.5);
+    let shape = Shape::cuboid(half).unwrap();
+    for roll in [-0.01, -0.004, 0.0, 0.004, 0.01] {
+        // Pitched down over the rim at x = 5 by 17°, rolled about its length by little.
+        let turn = Rotation::from_xyzw(roll, 0.0, -0.15, 1.0).normalize();
+        let mut pose = Pose::new(Vec3::new(5.0, 0.0, 0.0), turn);
+        let under = |pose: &Pose, z: Real| {
+            // Height of the underside over the rim at this z.
+            let (normal, on) = (turn.rotate(-Vec3::Y), pose.transform_point(-Vec3::Y * half.y));
+            (normal.dot(on) - normal.x * 5.0 - normal.z * z) / normal.y - 1.0
+        };
+        pose.position.y = 0.0;
+        pose.position.y = -min(under(&pose, -0.5), under(&pose, 0.5)) - 0.002;
+        let manifold = touch(&mesh, &shape, &pose);
+        let (low, high) = manifold.points().iter().fold((Real::MAX, -Real::MAX), |(low, high), p| {
+            assert!((p.point1 - Vec3::new(5.0, 1.0, p.point1.z)).length() < 1e-3, "{p:?}");
+            (min(low, p.point1.z), max(high, p.point1.z))
+        });
+        assert!(low < -0.4 && high > 0.4, "roll {roll}: from {low} to {high}");
     }
 }
