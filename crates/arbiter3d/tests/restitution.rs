@@ -44,7 +44,6 @@ fn a_rebound_reaches_e_squared_h() {
                     let error = if restitution > 0.0 { top / expected - 1.0 } else { top / height };
                     let line =
                         format!("{name} h {height} e {restitution} at {rate} Hz: {top} ({:+.2} %)", error * 100.0);
-                    println!("{line}");
                     if error.abs() > 0.02 {
                         failures.push(line);
                     }

@@ -84,11 +84,6 @@ impl BroadPhase {
         self.fixed.len() + self.moving.len()
     }
 
-    /// Whether there are no proxies.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
     /// Gives a shape a proxy with a fat box. Its pairs are found by the next search.
     pub fn add(&mut self, shape: u32, kind: TreeKind, fat: Aabb) {
         let index = shape as usize;
@@ -131,11 +126,6 @@ impl BroadPhase {
     /// The fat box of a shape with a proxy.
     pub fn fat_aabb(&self, shape: u32) -> Option<&Aabb> {
         self.proxy(shape).map(|proxy| self.tree(proxy.kind).aabb(proxy.leaf))
-    }
-
-    /// Whether the next search looks for the pairs of this shape.
-    pub fn is_moved(&self, shape: u32) -> bool {
-        self.proxy(shape).is_some_and(|proxy| self.tree(proxy.kind).is_marked(proxy.leaf))
     }
 
     /// One of the two trees.
@@ -228,19 +218,6 @@ impl BroadPhase {
         for tree in [&self.fixed, &self.moving] {
             if limit >= 0.0 {
                 tree.ray(origin, direction, limit, |shape, present| {
-                    limit = crate::math::min(visit(shape, present), present);
-                    limit
-                });
-            }
-        }
-    }
-
-    /// Calls `visit` with each shape whose fat box the moving box meets, static ones first; see [`DynamicTree::sweep`].
-    pub fn sweep(&self, aabb: &Aabb, displacement: Vec3, max_fraction: Real, mut visit: impl FnMut(u32, Real) -> Real) {
-        let mut limit = max_fraction;
-        for tree in [&self.fixed, &self.moving] {
-            if limit >= 0.0 {
-                tree.sweep(aabb, displacement, limit, |shape, present| {
                     limit = crate::math::min(visit(shape, present), present);
                     limit
                 });

@@ -241,7 +241,11 @@ impl World {
             self.add_proxy(slot);
         }
         self.update_mass(index);
-        self.wake(index);
+        // A body that was added asleep sleeps on with its first shape; later ones change what rests on what.
+        let body = &self.bodies[index as usize];
+        if body.awake || body.shapes.len() > 1 {
+            self.wake(index);
+        }
         Ok(id)
     }
 

@@ -16,6 +16,9 @@ use crate::solver::{
 /// Bodies that a thread takes at a time.
 const BODIES_PER_BLOCK: usize = 128;
 
+/// Stiffest spring of a contact, as a share of the substep rate: past it, tall stacks ring.
+const MAX_CONTACT_RATE: Real = 0.1875;
+
 /// What a step has to report beyond events.
 ///
 /// ```
@@ -200,15 +203,11 @@ impl World {
     fn solve(&mut self, dt: Real) {
         let settings = self.scaled;
         let substep = dt / settings.substeps as Real;
-        let hertz = min(settings.contact_hertz, 0.125 / substep);
-        // Against the ground twice as stiff: what stands on it has the weight of all above. And so for deep overlaps.
-        let stiff = Softness::new(2.0 * hertz, 0.5 * settings.contact_damping_ratio, substep);
+        let hertz = min(settings.contact_hertz, MAX_CONTACT_RATE / substep);
         let pass = |softness: Softness| PassParameters {
             inverse_substep: 1.0 / substep,
             push_out_speed: settings.push_out_speed,
             softness,
-            deep_softness: stiff,
-            slop: settings.slop,
             restitution_threshold: settings.restitution_threshold,
         };
         // Against the ground twice as stiff: what stands on it has the weight of all above.
@@ -292,8 +291,9 @@ impl World {
         // Threads report in any order; the trees and the report must not depend on it.
         news.sort_unstable_by_key(|item| match *item {
             BodyNews::Broken(body) => (0, body),
-            BodyNews::Fast(body) => (1, body),
-            BodyNews::Moved { shape, .. } => (2, shape),
+            // Before the fast: a body that is stopped short moves its boxes back.
+            BodyNews::Moved { shape, .. } => (1, shape),
+            BodyNews::Fast(body) => (2, body),
         });
         for item in news.drain(..) {
             match item {
