@@ -76,6 +76,7 @@ impl World {
         if dt < 1e-9 {
             return Ok(report);
         }
+        self.dt = dt;
         let mut clock = PhaseClock::start();
         self.events.begin_step();
         self.flush_events();
