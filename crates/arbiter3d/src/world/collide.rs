@@ -161,7 +161,7 @@ impl CollideContext<'_> {
         }
         let [center1, center2] = pair.bodies.map(|body| self.solver.masses[body as usize].pose());
         let between = center1.relative(&center2);
-        if pair.has_manifold && pair.hardly_moved(&between) {
+        if pair.has_manifold && self.may_reuse(pair, &between) {
             if let Some(arbiter) = arbiter.filter(|_| !pair.hardly_turned(center1.rotation)) {
                 pair.manifold_rotation = center1.rotation;
                 turn_levers(&mut arbiter.data, center1.rotation, center2.rotation);
@@ -170,6 +170,16 @@ impl CollideContext<'_> {
         }
         pair.manifold_rotation = center1.rotation;
         self.collide_anew(index, pair, &between, arbiter)
+    }
+
+    /// Whether last time's manifold still holds, or last time's lack of one.
+    #[inline(always)]
+    fn may_reuse(&self, pair: &Pair, between: &Pose) -> bool {
+        if pair.arbiter != NONE {
+            return pair.hardly_moved(between);
+        }
+        let [v1, v2] = pair.bodies.map(|body| self.solver.states[body as usize].linear_velocity);
+        pair.still_apart(between, (v2 - v1).length() * self.dt, self.settings.speculative_distance)
     }
 
     /// Makes a new manifold.
@@ -194,6 +204,8 @@ impl CollideContext<'_> {
             update_contacts(&mut arbiter.data, &manifold, &frame, self.settings.contact_break_distance);
             return manifold.points().is_empty().then_some(News::Empty(pair.arbiter));
         }
+        pair.has_manifold = manifold.points().is_empty() && self.filters.contact.is_none();
+        pair.manifold_pose = *between;
         let key = ArbiterKey::of_shapes(s1.id, s2.id);
         self.begins(pair, &manifold, &frame).then_some(News::Begin(key, index, manifold))
     }
