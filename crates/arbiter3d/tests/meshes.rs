@@ -77,7 +77,10 @@ fn slides_like_on_a_box(name: &str, shape: &Shape) {
         assert!(lost < 2e-3, "{name} at {degrees}°: {on_mesh:?} on the mesh, {on_box:?} on the box");
         assert!(on_mesh.aside < on_box.aside + 5e-3, "{name} at {degrees}°: {on_mesh:?}, on the box {on_box:?}");
     }
-    println!("{name}: bump {:.1e} m/s, speed differs by {:.1e} m/s, aside {:.1e} m/s", worst.bump, worst.speed, worst.aside);
+    println!(
+        "{name}: bump {:.1e} m/s, speed differs by {:.1e} m/s, aside {:.1e} m/s",
+        worst.bump, worst.speed, worst.aside
+    );
 }
 
 /// A sphere does not feel the inner edges of a flat mesh.

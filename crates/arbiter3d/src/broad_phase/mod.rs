@@ -84,11 +84,6 @@ impl BroadPhase {
         self.fixed.len() + self.moving.len()
     }
 
-    /// Whether there are no proxies.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
     /// Gives a shape a proxy with a fat box. Its pairs are found by the next search.
     pub fn add(&mut self, shape: u32, kind: TreeKind, fat: Aabb) {
         let index = shape as usize;
@@ -133,11 +128,6 @@ impl BroadPhase {
         self.proxy(shape).map(|proxy| self.tree(proxy.kind).aabb(proxy.leaf))
     }
 
-    /// Whether the next search looks for the pairs of this shape.
-    pub fn is_moved(&self, shape: u32) -> bool {
-        self.proxy(shape).is_some_and(|proxy| self.tree(proxy.kind).is_marked(proxy.leaf))
-    }
-
     /// One of the two trees.
     pub fn tree(&self, kind: TreeKind) -> &DynamicTree {
         match kind {
@@ -152,8 +142,8 @@ impl BroadPhase {
     /// A filter that rejects the pairs known already makes the result the new pairs.
     pub fn find_pairs(&mut self, filter: impl Fn(u32, u32) -> bool, out: &mut Vec<(u32, u32)>) {
         let mut work = std::mem::take(&mut self.work);
-        let mut scratch = std::mem::take(&mut self.scratch);
         self.prepare(1, &mut work);
+        let mut scratch = std::mem::take(&mut self.scratch);
         out.clear();
         for part in &work {
             self.pairs_of(part, &filter, &mut scratch, out);
@@ -228,19 +218,6 @@ impl BroadPhase {
         for tree in [&self.fixed, &self.moving] {
             if limit >= 0.0 {
                 tree.ray(origin, direction, limit, |shape, present| {
-                    limit = crate::math::min(visit(shape, present), present);
-                    limit
-                });
-            }
-        }
-    }
-
-    /// Calls `visit` with each shape whose fat box the moving box meets, static ones first; see [`DynamicTree::sweep`].
-    pub fn sweep(&self, aabb: &Aabb, displacement: Vec3, max_fraction: Real, mut visit: impl FnMut(u32, Real) -> Real) {
-        let mut limit = max_fraction;
-        for tree in [&self.fixed, &self.moving] {
-            if limit >= 0.0 {
-                tree.sweep(aabb, displacement, limit, |shape, present| {
                     limit = crate::math::min(visit(shape, present), present);
                     limit
                 });

@@ -33,22 +33,6 @@ impl PairSet {
         Self::default()
     }
 
-    /// Number of pairs.
-    pub fn len(&self) -> usize {
-        self.len
-    }
-
-    /// Whether there is no pair.
-    pub fn is_empty(&self) -> bool {
-        self.len == 0
-    }
-
-    /// Removes all pairs; keeps the memory.
-    pub fn clear(&mut self) {
-        self.keys.fill(EMPTY);
-        self.len = 0;
-    }
-
     /// The value of a pair; the order of the two does not matter.
     #[inline]
     pub fn get(&self, a: u32, b: u32) -> Option<u32> {
@@ -171,7 +155,7 @@ mod tests {
                 1 => assert_eq!(set.remove(b, a), model.remove(&(low, high))),
                 _ => assert_eq!(set.get(b, a), model.get(&(low, high)).copied()),
             }
-            assert_eq!(set.len(), model.len());
+            assert_eq!(set.len, model.len());
         }
         for (&(a, b), &value) in &model {
             assert_eq!(set.get(a, b), Some(value));
@@ -179,7 +163,7 @@ mod tests {
         for &(a, b) in model.keys() {
             set.remove(a, b);
         }
-        assert!(set.is_empty() && set.keys.iter().all(|&key| key == EMPTY));
+        assert!(set.len == 0 && set.keys.iter().all(|&key| key == EMPTY));
     }
 
     /// Neighbouring indices, as scenes have them, must not cluster: a few probes a lookup, in a table half full.
@@ -197,7 +181,7 @@ mod tests {
             total += distance;
             longest = longest.max(distance);
         }
-        assert!(total as f64 / set.len() as f64 <= 1.0, "mean distance {}", total as f64 / set.len() as f64);
+        assert!(total as f64 / set.len as f64 <= 1.0, "mean distance {}", total as f64 / set.len as f64);
         assert!(longest <= 64, "longest distance {longest}");
     }
 }

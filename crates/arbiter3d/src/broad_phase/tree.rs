@@ -26,7 +26,7 @@ mod tests;
 
 pub use overlap::{LinkPair, PairSearch};
 
-use crate::math::{Aabb, Real};
+use crate::math::Aabb;
 
 /// No tree is higher than this, so traversal stacks have a fixed size. A tree that would grow higher is rebuilt in balance,
 /// which makes it at most 32 high.
@@ -204,7 +204,8 @@ impl DynamicTree {
     }
 
     /// Surface areas of all inner nodes over that of the root: the expected number of nodes a random query visits.
-    pub fn cost(&self) -> Real {
+    #[cfg(test)]
+    pub fn cost(&self) -> crate::math::Real {
         let mut sum = 0.0;
         if self.is_empty() || self.root.is_leaf() {
             return sum;
@@ -228,7 +229,7 @@ impl DynamicTree {
     }
 
     /// Whether a leaf has been moved or marked since the last [`Self::clear_marks`].
-    #[inline]
+    #[cfg(test)]
     pub fn is_marked(&self, leaf: u32) -> bool {
         self.link_at(self.leaves[leaf as usize].parent).is_moved()
     }

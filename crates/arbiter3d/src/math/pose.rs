@@ -53,7 +53,6 @@ impl Pose {
     /// `self` after `inner`: the pose in the outer frame of what `inner` places in this frame.
     #[inline(always)]
     #[must_use]
-    #[expect(clippy::should_implement_trait, reason = "a method keeps the chain readable: a.mul(&b)")]
     pub fn mul(&self, inner: &Self) -> Self {
         Self { rotation: self.rotation.mul(inner.rotation), position: self.transform_point(inner.position) }
     }

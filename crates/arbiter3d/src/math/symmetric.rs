@@ -40,7 +40,6 @@ impl SymmetricMat3 {
     /// Matrix times vector.
     #[inline(always)]
     #[must_use]
-    #[expect(clippy::should_implement_trait, reason = "a method, like those of Rotation and Pose")]
     pub fn mul(&self, v: Vec3) -> Vec3 {
         Vec3::new(
             self.xx * v.x + self.xy * v.y + self.xz * v.z,
@@ -52,7 +51,6 @@ impl SymmetricMat3 {
     /// Sum.
     #[inline]
     #[must_use]
-    #[expect(clippy::should_implement_trait, reason = "a method, like those of Rotation and Pose")]
     pub fn add(&self, o: &Self) -> Self {
         Self {
             xx: self.xx + o.xx,

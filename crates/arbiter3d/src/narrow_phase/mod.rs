@@ -6,7 +6,7 @@
 //!
 //! Every kernel keeps these laws:
 //! - all is in the frame of shape 1, so only the relative pose counts and a pair far from the origin loses no
-//! precision;
+//!   precision;
 //! - a normal is a finite unit vector from shape 1 to shape 2, even where centres coincide or edges are parallel;
 //! - all points of a convex pair have the bit-equal normal;
 //! - a manifold is complete in one call: up to four points, those within `margin` included, those beyond it left out;

@@ -207,10 +207,10 @@ pub(crate) unsafe fn gather<const L: usize>(
 /// No other thread may touch the bodies without [`READ_ONLY`].
 #[inline(always)]
 pub(crate) unsafe fn scatter<const L: usize>(states: &SharedStates<'_>, bodies: &[u32; L], velocity: &WideVelocity<L>) {
-    for lane in 0..L {
-        if bodies[lane] & READ_ONLY == 0 {
+    for (lane, &body) in bodies.iter().enumerate() {
+        if body & READ_ONLY == 0 {
             // SAFETY: promised by the caller; the reference ends with this iteration.
-            let state = unsafe { states.get_mut(bodies[lane] as usize) };
+            let state = unsafe { states.get_mut(body as usize) };
             state.linear_velocity = velocity.linear.get(lane);
             state.angular_velocity = velocity.angular.get(lane);
         }

@@ -4,7 +4,9 @@
 //! `c₁, c₂` the centres of mass, a point has the gap `n · ((c₂ + q₂ anchor₂) − (c₁ + q₁ anchor₁))`, levers `rₖ` (the anchors
 //! as they were turned when the manifold was made), and the response between points `i` and `j`
 //!
-//!     Aᵢⱼ = n·(M₁⁻¹ + M₂⁻¹)n + (r₁ⱼ×n)·I₁⁻¹(r₁ᵢ×n) + (r₂ⱼ×n)·I₂⁻¹(r₂ᵢ×n)
+//! ```text
+//! Aᵢⱼ = n·(M₁⁻¹ + M₂⁻¹)n + (r₁ⱼ×n)·I₁⁻¹(r₁ᵢ×n) + (r₂ⱼ×n)·I₂⁻¹(r₂ᵢ×n)
+//! ```
 //!
 //! whose diagonal is the inverse effective mass. Velocity parts that a contact leaves alone have their inverse mass or
 //! inertia set to zero, so they neither move nor count.
@@ -203,18 +205,18 @@ fn prepare_friction<const L: usize, const P: usize, const C: usize>(
     let (mut r1, mut r2, mut total) = (WideVec3::ZERO, WideVec3::ZERO, Wide::ZERO);
     let (two, one) = (Wide::splat(2.0), Wide::splat(1.0));
     let fade = Wide::splat(1.0 / crate::math::max(speculative_distance, 1e-12));
-    for i in 0..P {
-        let weight = (two - separations[i] * fade).min(one).max(Wide::splat(1e-6)) * gathered.present[i];
+    for (i, &separation) in separations.iter().enumerate() {
+        let weight = (two - separation * fade).min(one).max(Wide::splat(1e-6)) * gathered.present[i];
         r1 = r1.add_scaled(&gathered.r1[i], weight);
         r2 = r2.add_scaled(&gathered.r2[i], weight);
         total += weight;
     }
     let inverse = total.inverse_or_zero();
     let (r1, r2) = (r1.scale(inverse), r2.scale(inverse));
-    for i in 0..P {
+    for (i, &separation) in separations.iter().enumerate() {
         let away = gathered.r1[i] - r1;
         friction.levers[i] = away.dot(&away).sqrt() * gathered.present[i];
-        let sideways = gathered.apart[i].sub_scaled(&row.normal, separations[i]);
+        let sideways = gathered.apart[i].sub_scaled(&row.normal, separation);
         friction.drift = friction.drift.max((sideways.dot(&sideways) * gathered.present[i]).sqrt());
     }
     let (t1, t2) = wide_tangents(&row.normal);
@@ -268,7 +270,8 @@ fn warm_friction<const L: usize, const P: usize, const C: usize>(
     let (t1, t2) = (friction.tangent1.get(lane), friction.tangent2.get(lane));
     friction.impulse1[lane] = tangential.dot(t1);
     friction.impulse2[lane] = tangential.dot(t2);
-    friction.twist_impulse[lane] = twist;
+    // One point has no lever and solves no twist: what an arbiter of more points has left of it must not act on.
+    friction.twist_impulse[lane] = if P == 1 { 0.0 } else { twist };
     friction.target1[lane] = data.tangent_velocity.dot(t1);
     friction.target2[lane] = data.tangent_velocity.dot(t2);
     let _ = row;

@@ -657,10 +657,9 @@ impl World {
     }
 
     pub(crate) fn end_arbiters_of(&mut self, index: u32, reason: EndReason) {
-        while let Some(arbiter) = {
+        loop {
             let first = self.arbiters.of_body(index).next();
-            first
-        } {
+            let Some(arbiter) = first else { break };
             self.end_arbiter(arbiter, reason);
         }
     }

@@ -18,9 +18,8 @@ use super::shapes::ShapeSlot;
 use crate::arbiter::{Arbiter, ArbiterKey, Contact, ContactData, EndReason, NONE, ONE_NORMAL, SLOTS};
 use crate::math::{Pose, Real, Rotation, Vec3, max, min};
 use crate::narrow_phase::{Manifold, collide};
-use crate::parallel::SharedSlice;
+use crate::parallel::{Gather, SharedSlice};
 use crate::solver::SolverBodies;
-use std::sync::Mutex;
 
 /// Pairs that a thread takes at a time.
 const PAIRS_PER_BLOCK: usize = 64;
@@ -54,9 +53,10 @@ struct CollideContext<'a> {
 /// Buffers of the narrow phase, kept from step to step.
 #[derive(Debug, Default)]
 pub(crate) struct NarrowPhaseScratch {
-    news: Vec<News>,
+    news: Gather<News>,
     begins: Vec<(ArbiterKey, u32, Manifold)>,
     apart: Vec<u32>,
+    sensors: Vec<(u32, bool)>,
     /// Arbiters that may have nothing left.
     pub empty: Vec<u32>,
 }
@@ -66,16 +66,20 @@ impl World {
     pub(crate) fn collide_pairs(&mut self, dt: Real) {
         let mut scratch = std::mem::take(&mut self.narrow);
         scratch.empty.clear();
-        let news = Mutex::new(std::mem::take(&mut scratch.news));
-        self.run_pairs(dt, &news);
-        scratch.news = news.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
-        for item in scratch.news.drain(..) {
+        scratch.news.prepare(self.pool.threads(), PAIRS_PER_BLOCK);
+        self.run_pairs(dt, &scratch.news);
+        for item in scratch.news.list().drain(..) {
             match item {
                 News::Apart(pair) => scratch.apart.push(pair),
                 News::Begin(key, pair, manifold) => scratch.begins.push((key, pair, manifold)),
-                News::Sensor(pair, overlaps) => self.set_sensor_overlap(pair, overlaps),
+                News::Sensor(pair, overlaps) => scratch.sensors.push((pair, overlaps)),
                 News::Empty(arbiter) => scratch.empty.push(arbiter),
             }
+        }
+        // Threads report in any order; events and places must not depend on it.
+        scratch.sensors.sort_unstable_by_key(|&(pair, _)| self.pair_key(pair));
+        for (pair, overlaps) in scratch.sensors.drain(..) {
+            self.set_sensor_overlap(pair, overlaps);
         }
         scratch.apart.sort_unstable();
         for pair in scratch.apart.drain(..) {
@@ -89,7 +93,7 @@ impl World {
         self.narrow = scratch;
     }
 
-    fn run_pairs(&mut self, dt: Real, news: &Mutex<Vec<News>>) {
+    fn run_pairs(&mut self, dt: Real, news: &Gather<News>) {
         let context = CollideContext {
             shapes: &self.shapes,
             bodies: &self.bodies,
@@ -105,7 +109,7 @@ impl World {
         let arbiters = SharedSlice::new(self.arbiters.slots_mut());
         let blocks = active.len().div_ceil(PAIRS_PER_BLOCK);
         self.pool.run(blocks, |block| {
-            let mut found = Vec::new();
+            let mut found = news.block();
             let start = block * PAIRS_PER_BLOCK;
             for &index in &active[start..(start + PAIRS_PER_BLOCK).min(active.len())] {
                 // SAFETY: each active pair stands in the list once, and only this block visits it.
@@ -116,23 +120,28 @@ impl World {
                     found.push(item);
                 }
             }
-            if !found.is_empty() {
-                news.lock().unwrap_or_else(std::sync::PoisonError::into_inner).append(&mut found);
-            }
         });
+    }
+
+    fn pair_key(&self, pair: u32) -> ArbiterKey {
+        let [a, b] = self.pairs[pair as usize].shapes.map(|slot| self.shapes[slot as usize].id);
+        ArbiterKey::of_shapes(a, b)
     }
 
     /// Makes the arbiter of a pair that begins to touch.
     fn begin_pair(&mut self, key: ArbiterKey, pair_index: u32, manifold: &Manifold) {
-        if self.arbiters.find(key).is_some() {
-            return; // a user holds this key: the shapes collide through that arbiter
-        }
         let pair = &self.pairs[pair_index as usize];
         let [b1, b2] = pair.bodies;
         let [center1, center2] = [b1, b2].map(|body| self.solver_bodies.masses[body as usize].pose());
         let between = center1.relative(&center2);
         let reusable = self.filters.contact.is_none();
-        let index = self.create_arbiter(key, self.body_id(b1), self.body_id(b2));
+        let ids = [self.body_id(b1), self.body_id(b2)];
+        let index = match self.arbiters.find(key) {
+            None => self.create_arbiter(key, ids[0], ids[1]),
+            // The user has made an arbiter under the key of these shapes: it is theirs from now on.
+            Some(index) if [self.arbiters.at(index).body1, self.arbiters.at(index).body2] == ids => index,
+            Some(_) => return, // a key that was not reserved, in use between other bodies
+        };
         self.arbiters.at_mut(index).pair = pair_index;
         let pair = &mut self.pairs[pair_index as usize];
         (pair.arbiter, pair.has_manifold, pair.manifold_pose) = (index, reusable, between);

@@ -1,4 +1,4 @@
-//! Walks through the tree: boxes that overlap, boxes along a ray, boxes along the way of a moving box.
+//! Walks through the tree: boxes that overlap, boxes along a ray.
 //!
 //! No walk allocates: a tree is at most [`MAX_HEIGHT`] high, and a depth-first walk keeps one sibling a level.
 
@@ -7,7 +7,7 @@ use crate::math::{Aabb, Real, Vec3};
 
 const STACK: usize = MAX_HEIGHT as usize + 2;
 
-/// A box that moves along a line, or a point where its half extents are zero.
+/// A point that moves along a line.
 ///
 /// The line enters a box where it has passed the near plane of all three axes, and leaves where it passes the first far
 /// plane. Every operation is monotone in the box, rounding included: a parent is never missed when its child is hit.
@@ -15,19 +15,18 @@ const STACK: usize = MAX_HEIGHT as usize + 2;
 struct Line {
     origin: Vec3,
     inverse: Vec3,
-    half_extents: Vec3,
 }
 
 impl Line {
-    fn new(origin: Vec3, direction: Vec3, half_extents: Vec3) -> Self {
-        Self { origin, inverse: Vec3::ONE / direction, half_extents }
+    fn new(origin: Vec3, direction: Vec3) -> Self {
+        Self { origin, inverse: Vec3::ONE / direction }
     }
 
     /// Fraction at which the line enters, if it does so by `limit`.
     #[inline(always)]
     fn enter(&self, aabb: &Aabb, limit: Real) -> Option<Real> {
-        let low = (aabb.min - self.half_extents) - self.origin;
-        let high = (aabb.max + self.half_extents) - self.origin;
+        let low = aabb.min - self.origin;
+        let high = aabb.max - self.origin;
         let mut entry: Real = 0.0;
         let mut exit = limit;
         for axis in 0..3 {
@@ -78,12 +77,7 @@ impl DynamicTree {
     /// near ones mostly first. It gets the present limit of `t` and returns a new one: the same to go on, a smaller one to
     /// cut the ray, a negative one to stop.
     pub fn ray(&self, origin: Vec3, direction: Vec3, max_fraction: Real, visit: impl FnMut(u32, Real) -> Real) {
-        self.walk(&Line::new(origin, direction, Vec3::ZERO), max_fraction, visit);
-    }
-
-    /// Like [`Self::ray`] for a box that starts at `aabb` and moves by `t · displacement`.
-    pub fn sweep(&self, aabb: &Aabb, displacement: Vec3, max_fraction: Real, visit: impl FnMut(u32, Real) -> Real) {
-        self.walk(&Line::new(aabb.center(), displacement, aabb.half_extents()), max_fraction, visit);
+        self.walk(&Line::new(origin, direction), max_fraction, visit);
     }
 
     fn walk(&self, line: &Line, max_fraction: Real, mut visit: impl FnMut(u32, Real) -> Real) {
@@ -122,7 +116,7 @@ impl DynamicTree {
 
     /// Whether the walks would meet this box: the test they apply to leaves, for comparison with brute force.
     #[cfg(test)]
-    pub(super) fn line_meets(origin: Vec3, direction: Vec3, half_extents: Vec3, limit: Real, aabb: &Aabb) -> bool {
-        Line::new(origin, direction, half_extents).enter(aabb, limit).is_some()
+    pub(super) fn line_meets(origin: Vec3, direction: Vec3, limit: Real, aabb: &Aabb) -> bool {
+        Line::new(origin, direction).enter(aabb, limit).is_some()
     }
 }

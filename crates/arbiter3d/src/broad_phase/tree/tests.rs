@@ -1,7 +1,7 @@
 //! Trees against brute force.
 
 use super::*;
-use crate::math::Vec3;
+use crate::math::{Real, Vec3};
 
 /// A small generator for test data: PCG's linear step, top bits.
 struct Random(u64);
@@ -108,19 +108,11 @@ impl Model {
             found.push(data);
             present
         });
-        self.expect(found, |aabb| DynamicTree::line_meets(origin, direction, Vec3::ZERO, limit, aabb));
-
-        let mut found = Vec::new();
-        self.tree.sweep(&probe, direction, limit, |data, present| {
-            found.push(data);
-            present
-        });
-        let (center, half_extents) = (probe.center(), probe.half_extents());
-        self.expect(found, |aabb| DynamicTree::line_meets(center, direction, half_extents, limit, aabb));
+        self.expect(found, |aabb| DynamicTree::line_meets(origin, direction, limit, aabb));
     }
 }
 
-/// 12,000 random inserts, removals, moves, marks, refits and rebuilds; box, ray and sweep queries after every tenth.
+/// 12,000 random inserts, removals, moves, marks, refits and rebuilds; box and ray queries after every tenth.
 #[test]
 fn walks_agree_with_brute_force_through_random_edits() {
     let (mut model, mut random) = (Model::default(), Random(1));
