@@ -42,12 +42,8 @@ fn a_rebound_reaches_e_squared_h() {
                     let top = rebound(&shape, height, restitution, rate);
                     let expected = restitution * restitution * height;
                     let error = if restitution > 0.0 { top / expected - 1.0 } else { top / height };
-<<<<<<< HEAD
                     let line =
                         format!("{name} h {height} e {restitution} at {rate} Hz: {top} ({:+.2} %)", error * 100.0);
-=======
-                    let line = format!("{name} h {height} e {restitution} at {rate} Hz: {top} ({:+.2} %)", error * 100.0);
->>>>>>> main
                     if error.abs() > 0.02 {
                         failures.push(line);
                     }
