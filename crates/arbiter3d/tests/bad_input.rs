@@ -44,7 +44,11 @@ fn scene() -> (World, BodyId, BodyId) {
 
 /// Calls with bad input, asserts the error and that nothing has changed.
 #[track_caller]
-fn refused<T: std::fmt::Debug>(world: &mut World, what: &str, call: impl FnOnce(&mut World) -> Result<T, Error>) -> Error {
+fn refused<T: std::fmt::Debug>(
+    world: &mut World,
+    what: &str,
+    call: impl FnOnce(&mut World) -> Result<T, Error>,
+) -> Error {
     let before = (world.hash(), world.body_count(), world.arbiter_count(), world.awake_count(), *world.settings());
     let error = call(world).expect_err(what);
     let after = (world.hash(), world.body_count(), world.arbiter_count(), world.awake_count(), *world.settings());
@@ -80,7 +84,9 @@ fn bad_body_definitions_are_refused() {
     }
     for bad in BAD.into_iter().chain([-1.0, 2e6]) {
         refused_naming(&mut world, "linear_damping", |w| w.add_body(&BodyDefinition { linear_damping: bad, ..good() }));
-        refused_naming(&mut world, "angular_damping", |w| w.add_body(&BodyDefinition { angular_damping: bad, ..good() }));
+        refused_naming(&mut world, "angular_damping", |w| {
+            w.add_body(&BodyDefinition { angular_damping: bad, ..good() })
+        });
     }
     for bad in BAD {
         refused_naming(&mut world, "gravity_scale", |w| w.add_body(&BodyDefinition { gravity_scale: bad, ..good() }));
@@ -106,7 +112,8 @@ fn bad_masses_are_refused() {
     for (mass, inertia) in masses {
         let given = Some(MassProperties { mass, center: Vec3::ZERO, inertia });
         let what = format!("mass {mass} with {inertia:?}");
-        let error = refused(&mut world, &what, |w| w.add_body(&BodyDefinition { mass: given, ..BodyDefinition::dynamic() }));
+        let error =
+            refused(&mut world, &what, |w| w.add_body(&BodyDefinition { mass: given, ..BodyDefinition::dynamic() }));
         assert!(matches!(error, Error::BadMass { .. }), "{error}");
         refused(&mut world, &what, |w| w.body_mut(block).unwrap().set_mass(given));
     }
@@ -140,8 +147,12 @@ fn bad_body_changes_are_refused() {
         refused_naming(&mut world, "gravity_scale", |w| w.body_mut(block).unwrap().set_gravity_scale(bad));
     }
     // Finite arguments whose result is not.
-    refused(&mut world, "a lever too long", |w| w.body_mut(block).unwrap().apply_force_at(Vec3::X * 3e38, Vec3::Y * 3e38));
-    refused(&mut world, "an impulse too far out", |w| w.body_mut(block).unwrap().apply_impulse_at(Vec3::X * 3e38, Vec3::Y * 3e38));
+    refused(&mut world, "a lever too long", |w| {
+        w.body_mut(block).unwrap().apply_force_at(Vec3::X * 3e38, Vec3::Y * 3e38)
+    });
+    refused(&mut world, "an impulse too far out", |w| {
+        w.body_mut(block).unwrap().apply_impulse_at(Vec3::X * 3e38, Vec3::Y * 3e38)
+    });
     world.body_mut(block).unwrap().apply_force(Vec3::X * 3e38).unwrap();
     refused(&mut world, "forces that add up to infinity", |w| w.body_mut(block).unwrap().apply_force(Vec3::X * 3e38));
     assert_eq!(world.body(block).unwrap().force(), Vec3::X * 3e38);
@@ -344,7 +355,11 @@ fn a_broken_body_is_frozen_and_its_neighbours_go_on() {
     let mut world = sleepless();
     floor(&mut world, 0.5);
     let light = BodyDefinition {
-        mass: Some(MassProperties { mass: 1e-3, center: Vec3::ZERO, inertia: SymmetricMat3::diagonal(Vec3::splat(1e-3)) }),
+        mass: Some(MassProperties {
+            mass: 1e-3,
+            center: Vec3::ZERO,
+            inertia: SymmetricMat3::diagonal(Vec3::splat(1e-3)),
+        }),
         ..BodyDefinition::dynamic().at(Vec3::Y * 0.5)
     };
     let light = add(&mut world, &light, &ShapeDefinition::new(cube(0.5)));

@@ -214,7 +214,10 @@ fn user_data_is_kept() {
     let shape = ShapeDefinition { user_data: 1 << 100, ..ShapeDefinition::new(cube(0.5)) };
     let shape = world.add_shape(body, &shape).unwrap();
     run(&mut world, 0.1);
-    assert_eq!((world.body(body).unwrap().user_data(), world.shape(shape).unwrap().user_data()), (u128::MAX - 5, 1 << 100));
+    assert_eq!(
+        (world.body(body).unwrap().user_data(), world.shape(shape).unwrap().user_data()),
+        (u128::MAX - 5, 1 << 100)
+    );
     world.body_mut(body).unwrap().set_user_data(3);
     world.shape_mut(shape).unwrap().set_user_data(4);
     assert_eq!((world.body(body).unwrap().user_data(), world.shape(shape).unwrap().user_data()), (3, 4));

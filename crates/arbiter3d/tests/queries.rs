@@ -3,7 +3,9 @@
 mod common;
 
 use arbiter3d::math::{Aabb, Vec3};
-use arbiter3d::{BodyDefinition, BodyId, Filter, QueryFilter, Ray, RayHit, Shape, ShapeDefinition, ShapeId, World, cast_ray};
+use arbiter3d::{
+    BodyDefinition, BodyId, Filter, QueryFilter, Ray, RayHit, Shape, ShapeDefinition, ShapeId, World, cast_ray,
+};
 use common::*;
 
 /// 300 bodies of all shapes strewn about, some static, and a piece of mesh.
@@ -12,12 +14,14 @@ fn strewn(random: &mut Random) -> World {
     for at in 0..300 {
         let place = Vec3::new(random.range(-10.0, 10.0), random.range(-10.0, 10.0), random.range(-10.0, 10.0));
         let body = if at % 3 == 0 { BodyDefinition::fixed() } else { BodyDefinition::dynamic() };
-        let shape = ShapeDefinition::new(random.shape()).filter(Filter { category: 1 << (at % 4), ..Filter::default() });
+        let shape =
+            ShapeDefinition::new(random.shape()).filter(Filter { category: 1 << (at % 4), ..Filter::default() });
         let shape = shape.at(random.vector(0.3)).rotated(random.rotation());
         let shape = if at % 10 == 7 { shape.sensor() } else { shape };
         add(&mut world, &body.at(place).rotated(random.rotation()), &shape);
     }
-    let sheet = [Vec3::new(-9.0, 0.0, -9.0), Vec3::new(9.0, 1.0, -9.0), Vec3::new(9.0, 0.0, 9.0), Vec3::new(-9.0, -1.0, 9.0)];
+    let sheet =
+        [Vec3::new(-9.0, 0.0, -9.0), Vec3::new(9.0, 1.0, -9.0), Vec3::new(9.0, 0.0, 9.0), Vec3::new(-9.0, -1.0, 9.0)];
     let mesh = Shape::mesh(sheet.to_vec(), vec![[0, 2, 1], [0, 3, 2]]).unwrap();
     world.add_shape(BodyId::WORLD, &ShapeDefinition::new(mesh)).unwrap();
     world

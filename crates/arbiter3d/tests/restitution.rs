@@ -105,7 +105,8 @@ fn a_bouncing_ball_comes_to_rest() {
 /// Restitutions are combined by rule, the larger by default.
 #[test]
 fn restitutions_are_combined_by_rule() {
-    for (rule, expected) in [(CombineRule::Maximum, 0.8_f32), (CombineRule::Average, 0.4), (CombineRule::Minimum, 0.0)] {
+    for (rule, expected) in [(CombineRule::Maximum, 0.8_f32), (CombineRule::Average, 0.4), (CombineRule::Minimum, 0.0)]
+    {
         let mut world = weightless();
         floor(&mut world, 0.0);
         let material = Material { restitution: 0.8, restitution_combine: rule, ..Material::default() };
