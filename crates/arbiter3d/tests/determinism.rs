@@ -20,12 +20,12 @@ use common::*;
 
 /// The hashes of the scenes, in their order.
 const GOLDEN: [(&str, u64); 6] = [
-    ("pile", 0x4947_e745_28ae_d943),
-    ("hulls", 0x8303_5e8f_f1b0_8d00),
-    ("mesh rain", 0xbe75_e2de_7a7c_0a74),
-    ("bullets", 0xaeb6_0a40_3eb7_e7c0),
-    ("custom contacts", 0xc532_d87d_b342_e671),
-    ("coming and going", 0x836c_5bff_d4a9_e29c),
+    ("pile", 0xfe1c_e449_9257_c7bd),
+    ("hulls", 0x0759_4023_48c6_20c0),
+    ("mesh rain", 0x46d0_deea_3d67_84d4),
+    ("bullets", 0xc8b7_1fe5_5908_8e3a),
+    ("custom contacts", 0x7b46_df47_c114_3b7e),
+    ("coming and going", 0xb66d_9f34_e6b5_ec67),
 ];
 
 /// A scene: how it begins, and what is done before each step.
@@ -289,7 +289,7 @@ fn golden_coming_and_going() {
 /// The scenes do what they are for: they have contacts, sleepers and motion.
 #[test]
 fn the_scenes_are_worth_hashing() {
-    for (scene, contacts) in SCENES.iter().zip([500, 300, 400, 100, 150, 100]) {
+    for (scene, contacts) in SCENES.iter().zip([500, 300, 400, 50, 150, 100]) {
         let mut world = World::new(settings(1, SimdLevel::best())).unwrap();
         let hashes = play(&mut world, scene);
         let found = world.contact_count();

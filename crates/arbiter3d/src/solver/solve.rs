@@ -51,6 +51,8 @@ impl Softness {
 pub(crate) struct PassParameters {
     pub inverse_substep: Real,
     pub push_out_speed: Real,
+    /// Overlap past which a contact at rest gives no further, m: its spring is as much stiffer as its load asks for.
+    pub deepest_rest: Real,
     pub softness: Softness,
     pub restitution_threshold: Real,
 }
@@ -233,6 +235,7 @@ fn solve_normals<const L: usize, const P: usize, const C: usize, const BIAS: boo
     let (soft, one) = (Wide::splat(pass.softness.mass_scale), Wide::splat(1.0));
     let leak = Wide::splat(pass.softness.impulse_scale);
     let limit = Wide::splat(-pass.push_out_speed);
+    let firmest = rate * Wide::splat(pass.deepest_rest);
     let mut sum = Impulse::ZERO;
     let mut pair = 0;
     for i in 0..P {
@@ -245,7 +248,7 @@ fn solve_normals<const L: usize, const P: usize, const C: usize, const BIAS: boo
         };
         let old = row.impulses[i];
         let change = if BIAS {
-            row.points[i].mass * (scale * velocities[i] + bias) + leak * old
+            row.points[i].mass * (scale * velocities[i] + bias) + (leak * old).min(row.points[i].mass * firmest)
         } else {
             row.points[i].mass * (velocities[i] + bias)
         };
