@@ -339,7 +339,7 @@ fn adding_and_removing_keeps_the_world_in_order() {
     let mut random = Random(21);
     let mut bodies: Vec<BodyId> = Vec::new();
     for step in 0..600 {
-        if bodies.len() < 60 || random.bits() % 2 == 0 {
+        if bodies.len() < 60 || random.bits().is_multiple_of(2) {
             let place = Vec3::new(random.range(-3.0, 3.0), random.range(0.5, 4.0), random.range(-3.0, 3.0));
             let shape = random.shape();
             bodies.push(drop_shape(&mut world, &shape, place));

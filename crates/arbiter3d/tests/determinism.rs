@@ -108,7 +108,7 @@ fn bullets(world: &mut World) {
 }
 
 fn shoot(world: &mut World, step: usize) {
-    if step % 4 == 0 {
+    if step.is_multiple_of(4) {
         let mut random = Random(1000 + step as u64);
         let from = Vec3::new(random.range(-5.0, 5.0), random.range(0.5, 5.0), -6.0);
         let body = BodyDefinition::dynamic()
@@ -165,7 +165,7 @@ fn coming_and_going(world: &mut World) {
 
 /// Adds, removes, pushes, teleports and changes bodies; for the last part all is left alone, and sleeps in part.
 fn come_and_go(world: &mut World, step: usize) {
-    if step > 200 || step % 5 != 0 {
+    if step > 200 || !step.is_multiple_of(5) {
         return;
     }
     let mut random = Random(2000 + step as u64);
@@ -181,8 +181,10 @@ fn come_and_go(world: &mut World, step: usize) {
     world.remove_body(gone).unwrap();
     let mut random = Random(3000 + step as u64);
     let body = BodyDefinition::dynamic().at(Vec3::Y * 5.0 + random.vector(2.0)).rotated(random.rotation());
-    let body =
-        BodyDefinition { locked_axes: if step % 20 == 0 { LockedAxes::ROTATION_Y } else { LockedAxes::NONE }, ..body };
+    let body = BodyDefinition {
+        locked_axes: if step.is_multiple_of(20) { LockedAxes::ROTATION_Y } else { LockedAxes::NONE },
+        ..body
+    };
     add(world, &body, &ShapeDefinition::new(random.shape()));
 }
 

@@ -6,6 +6,9 @@ use arbiter3d::math::Vec3;
 use arbiter3d::{BodyDefinition, BodyId, BodyKind, ShapeDefinition, World, WorldSettings};
 use common::*;
 
+/// Something done to a body.
+type Change = fn(&mut World, BodyId);
+
 fn awake(world: &World, body: BodyId) -> bool {
     world.body(body).unwrap().is_awake()
 }
@@ -105,7 +108,7 @@ fn removing_the_middle_wakes_the_top() {
 /// So does removing its shape, disabling the body, or moving the ground away.
 #[test]
 fn changes_below_wake_what_stands_there() {
-    let cases: [(&str, fn(&mut World, BodyId), f32); 4] = [
+    let cases: [(&str, Change, f32); 4] = [
         ("lower the base", |world, base| world.body_mut(base).unwrap().set_position(Vec3::Y * -1.5).unwrap(), 1.0),
         ("remove the base", |world, base| world.remove_body(base).unwrap(), -0.5),
         ("disable the base", |world, base| world.body_mut(base).unwrap().set_enabled(false).unwrap(), -0.5),
@@ -131,7 +134,6 @@ fn changes_below_wake_what_stands_there() {
 /// Forces, impulses, velocities and teleports wake; zeros do not.
 #[test]
 fn what_wakes_a_sleeper() {
-    type Change = fn(&mut World, BodyId);
     let wakes: [(&str, Change); 7] = [
         ("force", |world, id| world.body_mut(id).unwrap().apply_force(Vec3::X).unwrap()),
         ("torque", |world, id| world.body_mut(id).unwrap().apply_torque(Vec3::X).unwrap()),
