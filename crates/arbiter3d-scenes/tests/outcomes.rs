@@ -133,3 +133,14 @@ fn the_ball_breaks_the_colosseum() {
     let fallen = mean_height(&scene.world);
     assert!(fallen < stood - 0.2, "mean height {stood} m, then {fallen} m");
 }
+
+/// Bodies that start asleep stay so: only the hundred balls are ever awake.
+#[test]
+fn the_field_sleeps_from_the_start() {
+    let options = SceneOptions { size: Some(1000), ..SceneOptions::default() };
+    let mut scene = find("sleeping_field").unwrap().build(&options).unwrap();
+    for step in 0..10 {
+        scene.step(step).unwrap();
+        assert_eq!((scene.world.awake_count(), scene.world.sleeping_count()), (100, 1000), "step {step}");
+    }
+}

@@ -240,7 +240,10 @@ fn only_dynamic_bodies_take_forces() {
         wall.apply_angular_impulse(Vec3::X).unwrap();
         world.step(DT).unwrap();
         let body = world.body(body).unwrap();
-        assert_eq!((body.linear_velocity(), body.angular_velocity(), body.force()), (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO));
+        assert_eq!(
+            (body.linear_velocity(), body.angular_velocity(), body.force()),
+            (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO)
+        );
     }
 }
 
@@ -326,7 +329,8 @@ fn a_body_turns_about_its_center_of_mass() {
 #[test]
 fn a_given_mass_overrules_the_shapes() {
     let mut world = weightless();
-    let given = MassProperties { mass: 2.0, center: Vec3::Y * 0.5, inertia: SymmetricMat3::diagonal(Vec3::new(1.0, 2.0, 3.0)) };
+    let given =
+        MassProperties { mass: 2.0, center: Vec3::Y * 0.5, inertia: SymmetricMat3::diagonal(Vec3::new(1.0, 2.0, 3.0)) };
     let body = BodyDefinition { mass: Some(given), ..BodyDefinition::dynamic() };
     let body = add(&mut world, &body, &ShapeDefinition::new(cube(0.5)));
     world.body_mut(body).unwrap().apply_impulse_at(Vec3::new(4.0, 0.0, 0.0), Vec3::ZERO).unwrap();

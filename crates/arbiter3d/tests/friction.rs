@@ -13,9 +13,9 @@ fn on_ramp(shape: &Shape, height: f32, friction: f32) -> (World, BodyId) {
     let mut world = sleepless();
     let tilt = turn(Vec3::Z, -SLOPE);
     let ramp = BodyDefinition::fixed().at(tilt * Vec3::new(0.0, -1.0, 0.0)).rotated(tilt);
-    add(&mut world, &ramp, &ShapeDefinition::new(cuboid(200.0, 1.0, 20.0)).friction(friction));
+    add(&mut world, &ramp, &ShapeDefinition::new(cuboid(200.0, 1.0, 20.0)).friction(friction).rolling_resistance(0.0));
     let body = BodyDefinition::dynamic().at(tilt * Vec3::new(0.0, height, 0.0)).rotated(tilt);
-    let body = add(&mut world, &body, &ShapeDefinition::new(shape.clone()).friction(friction));
+    let body = add(&mut world, &body, &ShapeDefinition::new(shape.clone()).friction(friction).rolling_resistance(0.0));
     (world, body)
 }
 
@@ -136,9 +136,10 @@ fn without_rolling_resistance_a_ball_rolls_on() {
     let mut world = sleepless();
     floor(&mut world, 0.5);
     let rolling = BodyDefinition::dynamic().at(Vec3::Y * 0.5).moving(Vec3::X * 2.0, Vec3::Z * -4.0);
-    let rolling = add(&mut world, &rolling, &ShapeDefinition::new(sphere(0.5)));
+    let ideal = ShapeDefinition::new(sphere(0.5)).rolling_resistance(0.0);
+    let rolling = add(&mut world, &rolling, &ideal);
     let thrown = BodyDefinition::dynamic().at(Vec3::new(0.0, 0.5, 5.0)).moving(Vec3::X * 7.0, Vec3::ZERO);
-    let thrown = add(&mut world, &thrown, &ShapeDefinition::new(sphere(0.5)));
+    let thrown = add(&mut world, &thrown, &ideal);
     run(&mut world, 10.0);
     assert_relative(velocity(&world, rolling).x, 2.0, 0.005, "speed of the rolling ball");
     assert_relative(position(&world, rolling).x, 20.0, 0.005, "its way");

@@ -42,7 +42,12 @@ fn a_tower_of_40_cubes_stands_and_sleeps() {
     let start = positions(&world, &blocks);
     run(&mut world, 60.0);
     let (side, down) = displacement(&world, &blocks, &start);
-    println!("tower: top moved {:.3} mm sideways, {:.3} mm down; deepest {}", side * 1e3, down * 1e3, world.deepest_penetration());
+    println!(
+        "tower: top moved {:.3} mm sideways, {:.3} mm down; deepest {}",
+        side * 1e3,
+        down * 1e3,
+        world.deepest_penetration()
+    );
     assert_eq!(world.awake_count(), 0, "it sleeps");
     assert!(side < 0.01 && down < 0.2, "moved {side} sideways, {down} down");
     assert!(world.deepest_penetration() < 0.01);
@@ -57,7 +62,12 @@ fn a_tower_of_40_cubes_stands_awake() {
     let start = positions(&world, &blocks);
     run(&mut world, 60.0);
     let (side, down) = displacement(&world, &blocks, &start);
-    println!("awake tower: {:.3} mm sideways, {:.3} mm down; deepest {}", side * 1e3, down * 1e3, world.deepest_penetration());
+    println!(
+        "awake tower: {:.3} mm sideways, {:.3} mm down; deepest {}",
+        side * 1e3,
+        down * 1e3,
+        world.deepest_penetration()
+    );
     assert_eq!(world.awake_count(), 40);
     assert!(side < 0.05 && down < 0.2, "moved {side} sideways, {down} down");
     assert!(world.deepest_penetration() < 0.01);
@@ -72,7 +82,12 @@ fn a_pyramid_of_20_rows_stands_and_sleeps() {
     let start = positions(&world, &blocks);
     run(&mut world, 60.0);
     let (side, down) = displacement(&world, &blocks, &start);
-    println!("pyramid: {:.3} mm sideways, {:.3} mm down; deepest {}", side * 1e3, down * 1e3, world.deepest_penetration());
+    println!(
+        "pyramid: {:.3} mm sideways, {:.3} mm down; deepest {}",
+        side * 1e3,
+        down * 1e3,
+        world.deepest_penetration()
+    );
     assert_eq!(world.awake_count(), 0, "it sleeps");
     assert!(side < 0.02 && down < 0.1, "moved {side} sideways, {down} down");
     assert!(world.deepest_penetration() < 0.01);
@@ -160,7 +175,8 @@ fn a_pile_of_1000_mixed_bodies_sleeps_within_20_seconds() {
 fn nothing_is_deeper_than_two_slops_at_rest() {
     let mut world = sleepless();
     floor(&mut world, 0.6);
-    for (at, shape) in [sphere(0.5), cube(0.5), capsule(0.5, 0.3), icosahedron(0.5), wedge(0.5)].into_iter().enumerate() {
+    for (at, shape) in [sphere(0.5), cube(0.5), capsule(0.5, 0.3), icosahedron(0.5), wedge(0.5)].into_iter().enumerate()
+    {
         let x = at as f32 * 4.0;
         let settled = ShapeDefinition::new(shape).rolling_resistance(0.05);
         add(&mut world, &BodyDefinition::dynamic().at(Vec3::new(x, 1.0, 0.0)), &settled);

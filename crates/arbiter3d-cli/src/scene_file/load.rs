@@ -217,6 +217,12 @@ impl Template {
         for (index, shape) in self.shapes.iter().enumerate() {
             world.add_shape(id, shape).map_err(|error| (format!("{path}.shapes[{index}]"), error.to_string()))?;
         }
+        if !body.awake
+            && let Some(mut body) = world.body_mut(id)
+        {
+            // More than one shape has woken it.
+            body.sleep();
+        }
         Ok(())
     }
 }
@@ -369,6 +375,17 @@ mod tests {
         let world = built(&format!(r#"{{"bodies": [{{"mass": 7, "shapes": {shapes}}}]}}"#)).unwrap();
         let mass = world.body(world.bodies().nth(1).unwrap()).unwrap().mass();
         assert!((mass - 7.0).abs() < 1e-5, "{mass}");
+    }
+
+    #[test]
+    fn bodies_that_start_asleep_sleep_until_something_comes() {
+        let shapes = r#"[{"cuboid": {"half_extents": [0.5, 0.5, 0.5]}}, {"sphere": {"radius": 0.5}}]"#;
+        let floor =
+            r#"{"kind": "static", "position": [0, -1, 0], "shapes": [{"cuboid": {"half_extents": [9, 1, 9]}}]}"#;
+        let sleeper = format!(r#"{{"position": [0, 0.5, 0], "awake": false, "shapes": {shapes}}}"#);
+        let mut world = built(&format!(r#"{{"bodies": [{floor}, {sleeper}]}}"#)).unwrap();
+        world.step(1.0 / 60.0).unwrap();
+        assert_eq!((world.awake_count(), world.sleeping_count()), (0, 1));
     }
 
     #[test]

@@ -227,23 +227,7 @@ impl ArbiterStore {
 
     /// Makes an arbiter; the key must be free and the bodies different.
     pub fn create(&mut self, key: ArbiterKey, body1: BodyId, body2: BodyId) -> u32 {
-        let index = self.free.pop().unwrap_or_else(|| {
-            let index = u32::try_from(self.arbiters.len()).unwrap_or(NONE);
-            self.arbiters.push(Arbiter {
-                data: ContactData::default(),
-                key,
-                body1,
-                body2,
-                id: ArbiterId { index, generation: self.tag },
-                pair: NONE,
-                alive: false,
-                begun: false,
-                awake: false,
-                next: [NONE; 2],
-                previous: [NONE; 2],
-            });
-            index
-        });
+        let index = self.free.pop().unwrap_or_else(|| self.add_place(key, body1, body2));
         let arbiter = &mut self.arbiters[index as usize];
         arbiter.id.generation = arbiter.id.generation.wrapping_add(1);
         (arbiter.key, arbiter.body1, arbiter.body2) = (key, body1, body2);
@@ -253,6 +237,29 @@ impl ArbiterStore {
         self.link(index, 0, body1.index);
         self.link(index, 1, body2.index);
         self.set_awake(index, true);
+        index
+    }
+
+    /// Makes the pool one place larger.
+    fn add_place(&mut self, key: ArbiterKey, body1: BodyId, body2: BodyId) -> u32 {
+        let index = u32::try_from(self.arbiters.len()).unwrap_or(NONE);
+        self.arbiters.push(Arbiter {
+            data: ContactData::default(),
+            key,
+            body1,
+            body2,
+            id: ArbiterId { index, generation: self.tag },
+            pair: NONE,
+            alive: false,
+            begun: false,
+            awake: false,
+            next: [NONE; 2],
+            previous: [NONE; 2],
+        });
+        // A table at most half full clears out removed keys in place; a fuller one would grow in the middle of a step. The
+        // free list has room for every place, for the same reason.
+        self.by_key.reserve(2 * self.arbiters.len() - self.by_key.len());
+        self.free.reserve(self.arbiters.len());
         index
     }
 

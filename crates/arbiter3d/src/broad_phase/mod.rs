@@ -142,8 +142,8 @@ impl BroadPhase {
     /// A filter that rejects the pairs known already makes the result the new pairs.
     pub fn find_pairs(&mut self, filter: impl Fn(u32, u32) -> bool, out: &mut Vec<(u32, u32)>) {
         let mut work = std::mem::take(&mut self.work);
-        let mut scratch = std::mem::take(&mut self.scratch);
         self.prepare(1, &mut work);
+        let mut scratch = std::mem::take(&mut self.scratch);
         out.clear();
         for part in &work {
             self.pairs_of(part, &filter, &mut scratch, out);

@@ -6,6 +6,8 @@
 //!
 //! Roots are always the smallest member, so the result depends on the contacts and not on their order.
 
+use crate::arbiter::NONE;
+
 /// Finds islands among the bodies of one step.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct IslandFinder {
@@ -43,40 +45,56 @@ impl IslandFinder {
     }
 }
 
-/// Sleeping islands, each a list of bodies.
+/// Sleeping islands, each a list of bodies: linked through one array, so that worlds that sleep and wake need no new memory.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SleepingIslands {
-    islands: Vec<Vec<u32>>,
+    /// First body of each island.
+    first: Vec<u32>,
+    /// By body slot: the body after it in its island.
+    next: Vec<u32>,
     free: Vec<u32>,
 }
 
 impl SleepingIslands {
-    /// Makes an island and returns its number.
+    /// Makes an island of bodies of no other and returns its number.
     pub fn add(&mut self, bodies: &[u32]) -> u32 {
-        let number = self.free.pop().unwrap_or_else(|| {
-            self.islands.push(Vec::new());
-            (self.islands.len() - 1) as u32
-        });
-        self.islands[number as usize].extend_from_slice(bodies);
-        number
+        let slots = bodies.iter().fold(self.next.len(), |slots, &body| slots.max(body as usize + 1));
+        self.next.resize(slots, NONE);
+        let mut after = NONE;
+        for &body in bodies.iter().rev() {
+            self.next[body as usize] = std::mem::replace(&mut after, body);
+        }
+        if let Some(number) = self.free.pop() {
+            self.first[number as usize] = after;
+            return number;
+        }
+        self.first.push(after);
+        self.free.reserve(self.first.len());
+        (self.first.len() - 1) as u32
     }
 
-    /// Ends an island: its bodies are appended to `bodies`.
+    /// Ends an island: its bodies are appended to `bodies`, in the order in which they were given.
     pub fn take(&mut self, number: u32, bodies: &mut Vec<u32>) {
-        bodies.append(&mut self.islands[number as usize]);
+        bodies.extend(self.bodies(number));
+        self.first[number as usize] = NONE;
         self.free.push(number);
     }
 
     /// Bodies of an island.
-    pub fn bodies(&self, number: u32) -> &[u32] {
-        &self.islands[number as usize]
+    pub fn bodies(&self, number: u32) -> impl Iterator<Item = u32> + '_ {
+        let listed = |body: u32| (body != NONE).then_some(body);
+        std::iter::successors(listed(self.first[number as usize]), move |&body| listed(self.next[body as usize]))
     }
 
     /// Takes one body out of an island, which stays asleep.
     pub fn remove_body(&mut self, number: u32, body: u32) {
-        let island = &mut self.islands[number as usize];
-        island.retain(|&other| other != body);
-        if island.is_empty() {
+        let next = self.next[body as usize];
+        let before = self.bodies(number).find(|&other| self.next[other as usize] == body);
+        match before {
+            Some(before) => self.next[before as usize] = next,
+            None => self.first[number as usize] = next,
+        }
+        if self.first[number as usize] == NONE {
             self.free.push(number);
         }
     }
@@ -98,5 +116,23 @@ mod tests {
         }
         assert_eq!(roots[0], [0, 1, 2, 2, 1, 5, 6, 1, 8, 1]);
         assert!(roots.iter().all(|r| *r == roots[0]));
+    }
+    #[test]
+    fn sleeping_islands_keep_their_bodies_in_order_and_their_numbers_are_used_again() {
+        let mut islands = SleepingIslands::default();
+        let (a, b) = (islands.add(&[3, 5, 9]), islands.add(&[1]));
+        islands.remove_body(a, 5);
+        assert_eq!(islands.bodies(a).collect::<Vec<_>>(), [3, 9]);
+        islands.remove_body(a, 3);
+        islands.remove_body(b, 1);
+        assert_eq!(islands.add(&[5, 3]), b);
+        assert_eq!(
+            (islands.bodies(a).collect::<Vec<_>>(), islands.bodies(b).collect::<Vec<_>>()),
+            (vec![9], vec![5, 3])
+        );
+        let mut taken = vec![7];
+        islands.take(b, &mut taken);
+        assert_eq!(taken, [7, 5, 3]);
+        assert_eq!(islands.add(&[2]), b);
     }
 }

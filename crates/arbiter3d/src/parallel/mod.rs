@@ -8,8 +8,10 @@
 //! condition variable. With one thread the pool is a plain loop. Source of the scheme: the stage scheduler of
 //! BepuPhysics 2 and Box2D 3.
 
+mod gather;
 mod shared;
 
+pub(crate) use gather::{BlockList, Gather};
 pub(crate) use shared::SharedSlice;
 
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, AtomicUsize, Ordering};

@@ -270,7 +270,8 @@ fn warm_friction<const L: usize, const P: usize, const C: usize>(
     let (t1, t2) = (friction.tangent1.get(lane), friction.tangent2.get(lane));
     friction.impulse1[lane] = tangential.dot(t1);
     friction.impulse2[lane] = tangential.dot(t2);
-    friction.twist_impulse[lane] = twist;
+    // One point has no lever and solves no twist: what an arbiter of more points has left of it must not act on.
+    friction.twist_impulse[lane] = if P == 1 { 0.0 } else { twist };
     friction.target1[lane] = data.tangent_velocity.dot(t1);
     friction.target2[lane] = data.tangent_velocity.dot(t2);
     let _ = row;
@@ -332,7 +333,8 @@ pub(crate) fn store_lane<const L: usize, const P: usize, const C: usize>(
     for i in 0..P {
         load += row.impulses[i][lane];
     }
-    let share = if load > 0.0 { 1.0 / load } else { 0.0 };
+    // A quotient of the two: 1 / load is infinite for loads that are hardly numbers any more.
+    let share = |impulse: Real| if load > 0.0 { impulse / load } else { 0.0 };
     let moved = s2.translation - s1.translation;
     let approach = n.dot(moved);
     let (mut point, mut reach, mut widest) = (0, 0.0, -Real::MAX);
@@ -345,8 +347,8 @@ pub(crate) fn store_lane<const L: usize, const P: usize, const C: usize>(
         contact.normal = n;
         contact.normal_impulse = impulse;
         contact.total_impulse = friction.totals[point][lane];
-        contact.tangent_impulse = tangential * (impulse * share);
-        contact.twist_impulse = friction.twist_impulse[lane] * (impulse * share);
+        contact.tangent_impulse = tangential * share(impulse);
+        contact.twist_impulse = friction.twist_impulse[lane] * share(impulse);
         let gap = normal_point.separation[lane] + approach + normal_point.arm2.get(lane).dot(s2.turn)
             - normal_point.arm1.get(lane).dot(s1.turn);
         contact.separation = gap;

@@ -11,9 +11,9 @@
 //! λ' = max(λ − m (mass scale · vₙ + bias) − impulse scale · λ, 0)
 //! ```
 //!
-//! Arbiters of one or two contacts bear on these what others bear on four: past a slop their spring is twice as stiff, as
-//! those against the ground are, so that what is wedged into a heap with many times its weight stays within two slops. Not so
-//! for four contacts: in tall stacks the stiffer spring rings.
+//! The spring is stiffer (45 Hz at four substeps of 60 Hz) and less damped (3) than the 30 Hz and 10 of the source: a tower of 40
+//! cubes then sags 9.6 mm at its foot rather than 21.7, and what is wedged into a heap 5 mm rather than 13. The limit is
+//! 0.1875 of the substep rate; at 60 Hz a triangle of 100 rows rings.
 //!
 //! Source: Catto, "Soft Constraints", GDC 2011, and "Solver2D", 2024 (Soft Step). Friction is solved once a manifold, at a
 //! centre of its points: two tangents limited by a circular cone, a twist about the normal limited by the levers of the
@@ -44,11 +44,6 @@ impl Softness {
         let a3 = 1.0 / (1.0 + a2);
         Self { bias_rate: omega / a1, mass_scale: a2 * a3, impulse_scale: a3 }
     }
-
-    /// Impulse at rest for a unit of effective mass and overlap.
-    fn strength(&self) -> Real {
-        if self.impulse_scale > 0.0 { self.mass_scale * self.bias_rate / self.impulse_scale } else { 0.0 }
-    }
 }
 
 /// What the passes of a substep share.
@@ -56,21 +51,8 @@ impl Softness {
 pub(crate) struct PassParameters {
     pub inverse_substep: Real,
     pub push_out_speed: Real,
-    /// Spring of contacts that overlap by less than a slop, and of deeper ones.
     pub softness: Softness,
-    pub deep_softness: Softness,
-    pub slop: Real,
     pub restitution_threshold: Real,
-}
-
-impl PassParameters {
-    /// What is added to the separation of deep contacts, so that the two springs push alike where they meet.
-    ///
-    /// At rest a spring holds the impulse `m s · mass scale · bias rate / impulse scale`; a jump at one slop would have
-    /// contacts with loads between the two chatter about that depth.
-    fn deep_offset(&self) -> Real {
-        self.slop * (1.0 - self.softness.strength() / crate::math::max(self.deep_softness.strength(), 1e-30))
-    }
 }
 
 /// Applies the impulses of the last step.
@@ -168,6 +150,9 @@ pub(crate) unsafe fn relax<const L: usize, const P: usize, const C: usize>(
 
 /// Gives points that were hit their share of the approach speed back.
 ///
+/// The points of a manifold share the bounce: what one gives, it gives to all through the coupling. One sweep over four
+/// points costs a box that lands flat 7 % of its height; eight leave less than a tenth of a percent.
+///
 /// # Safety
 /// No other thread may touch the dynamic bodies of the row.
 #[inline(always)]
@@ -186,29 +171,40 @@ pub(crate) unsafe fn restitute<const L: usize, const P: usize, const C: usize>(
     let (mut v2, _) = unsafe { gather(states, &row.body2) };
     let mut velocities = normal_velocities(row, &v1, &v2);
     let threshold = Wide::splat(-pass.restitution_threshold);
+    let own: [Wide<L>; P] = std::array::from_fn(|i| row.points[i].mass.inverse_or_zero());
     let mut sum = Impulse::ZERO;
-    let mut pair = 0;
-    for i in 0..P {
-        let target = friction.restitution * friction.approach[i];
-        let old = row.impulses[i];
-        let wanted = (old - row.points[i].mass * (velocities[i] + target)).max(Wide::ZERO);
-        // Bounces only what hit: closing fast enough, and pressed within this step.
-        let bounces = (threshold - friction.approach[i]).if_positive(friction.totals[i], Wide::ZERO);
-        let new = (bounces * friction.restitution).if_positive(wanted, old);
-        let delta = new - old;
-        row.impulses[i] = new;
-        friction.totals[i] += delta;
-        for later in &mut velocities[i + 1..] {
-            *later += row.coupling[pair] * delta;
-            pair += 1;
+    for _ in 0..if P > 1 { RESTITUTION_SWEEPS } else { 1 } {
+        for i in 0..P {
+            let target = friction.restitution * friction.approach[i];
+            let old = row.impulses[i];
+            let wanted = (old - row.points[i].mass * (velocities[i] + target)).max(Wide::ZERO);
+            // Bounces only what hit: closing fast enough, and pressed within this step.
+            let bounces = (threshold - friction.approach[i]).if_positive(friction.totals[i], Wide::ZERO);
+            let new = (bounces * friction.restitution).if_positive(wanted, old);
+            let delta = new - old;
+            row.impulses[i] = new;
+            friction.totals[i] += delta;
+            for j in 0..P {
+                let response = if i == j { own[i] } else { row.coupling[pair_of::<P>(i.min(j), i.max(j))] };
+                velocities[j] += response * delta;
+            }
+            sum.add_point(row, i, delta);
         }
-        sum.add_point(row, i, delta);
     }
     sum.apply(row, &mut v1, &mut v2);
     // SAFETY: promised by the caller.
     unsafe { scatter(states, &row.body1, &v1) };
     // SAFETY: promised by the caller.
     unsafe { scatter(states, &row.body2, &v2) };
+}
+
+/// Sweeps of the bounce over the points of a manifold; once a step, and only where something bounces.
+const RESTITUTION_SWEEPS: usize = 8;
+
+/// Place of the points `i < j` in [`NormalRow::coupling`].
+#[inline(always)]
+const fn pair_of<const P: usize>(i: usize, j: usize) -> usize {
+    i * P - i * (i + 1) / 2 + j - i - 1
 }
 
 /// Normal velocity at each point.
@@ -233,23 +229,17 @@ fn solve_normals<const L: usize, const P: usize, const C: usize, const BIAS: boo
 ) {
     let mut velocities = normal_velocities(row, v1, v2);
     let inverse_substep = Wide::splat(pass.inverse_substep);
-    let (shallow, deep) = (&pass.softness, &pass.deep_softness);
-    let one = Wide::splat(1.0);
+    let rate = Wide::splat(pass.softness.mass_scale * pass.softness.bias_rate);
+    let (soft, one) = (Wide::splat(pass.softness.mass_scale), Wide::splat(1.0));
+    let leak = Wide::splat(pass.softness.impulse_scale);
     let limit = Wide::splat(-pass.push_out_speed);
     let mut sum = Impulse::ZERO;
     let mut pair = 0;
     for i in 0..P {
         let s = separations[i];
         let (bias, scale, leak) = if BIAS {
-            let depth = -s - Wide::splat(pass.slop);
-            let pick = |d: Real, s: Real| {
-                if P < 4 { depth.if_positive(Wide::splat(d), Wide::splat(s)) } else { Wide::splat(s) }
-            };
-            let rate = pick(deep.mass_scale * deep.bias_rate, shallow.mass_scale * shallow.bias_rate);
-            let push = ((s + pick(pass.deep_offset(), 0.0)) * rate).max(limit);
-            let scale = pick(deep.mass_scale, shallow.mass_scale);
-            let leak = pick(deep.impulse_scale, shallow.impulse_scale);
-            (s.if_positive(s * inverse_substep, push), s.if_positive(one, scale), s.if_positive(Wide::ZERO, leak))
+            let push = (s * rate).max(limit);
+            (s.if_positive(s * inverse_substep, push), s.if_positive(one, soft), s.if_positive(Wide::ZERO, leak))
         } else {
             (s.max(Wide::ZERO) * inverse_substep, one, Wide::ZERO)
         };

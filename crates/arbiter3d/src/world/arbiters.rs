@@ -9,7 +9,7 @@ use crate::arbiter::{
     Arbiter, ArbiterId, ArbiterKey, Contact, ContactPoint, EndReason, FRICTION_OVERRIDDEN, NONE,
     RESTITUTION_OVERRIDDEN, ROLLING_OVERRIDDEN, SolveMode, TANGENT_VELOCITY_OVERRIDDEN,
 };
-use crate::math::{Real, Vec3, max};
+use crate::math::{Real, Rotation, Vec3, max};
 use crate::shape::Shape;
 use std::ops::Range;
 
@@ -68,11 +68,11 @@ impl World {
     /// The arbiter with this key, made if there is none.
     ///
     /// A new one begins in the next step (or in this one, when called by a provider or a begin listener), wakes its bodies,
-    /// and takes the maximum of its bodies' frictions and restitutions. It ends in the first step that finds it without
-    /// contacts.
+    /// and takes the maximum of its bodies' frictions, restitutions and rolling resistances. It ends in the first step that
+    /// finds it without contacts. Under the key of two shapes, the engine goes on with it once they touch.
     ///
     /// # Errors
-    /// If a body is unknown, both are the same, neither is dynamic, or the key is in use between other bodies.
+    /// If a body is unknown or disabled, both are the same, neither is dynamic, or the key is in use between other bodies.
     pub fn get_or_create_arbiter(&mut self, key: ArbiterKey, body1: BodyId, body2: BodyId) -> Result<ArbiterId, Error> {
         if let Some(index) = self.arbiters.find(key) {
             let arbiter = self.arbiters.at(index);
@@ -86,8 +86,10 @@ impl World {
         if b1 == b2 {
             return Err(Error::SameBody { id: body1 });
         }
-        let dynamic = |index: u32| self.bodies[index as usize].is_dynamic() && self.bodies[index as usize].enabled;
-        if !dynamic(b1) && !dynamic(b2) {
+        if let Some(&id) = [body1, body2].iter().find(|id| !self.bodies[id.index as usize].enabled) {
+            return Err(Error::BodyDisabled { id });
+        }
+        if ![b1, b2].iter().any(|&index| self.bodies[index as usize].is_dynamic()) {
             return Err(Error::NeitherMoves { body1, body2 });
         }
         let index = self.create_arbiter(key, body1, body2);
@@ -218,8 +220,10 @@ impl World {
         let restitution = ma.restitution_combine.max(mb.restitution_combine).combine(ma.restitution, mb.restitution);
         let rolling = max(ma.rolling_resistance, mb.rolling_resistance)
             * rolling_radius([&a.geometry, &b.geometry], [ma, mb].map(|m| m.rolling_resistance));
-        let velocity = |side: usize, local: Vec3| self.bodies[pair.bodies[side] as usize].pose.rotation.rotate(local);
-        let tangent = velocity(0, ma.tangent_velocity) - velocity(1, mb.tangent_velocity);
+        let tangent = surface_velocity([ma, mb], pair.bodies.map(|body| self.bodies[body as usize].pose.rotation));
+        let conveyor = [ma, mb].iter().any(|material| material.tangent_velocity != Vec3::ZERO);
+        let pair = self.arbiters.at(index).pair;
+        self.pairs[pair as usize].conveyor = conveyor;
         let data = &mut self.arbiters.at_mut(index).data;
         let keeps = |flag: u8| data.flags & flag != 0;
         let (f, r, t, o) = (
@@ -245,12 +249,14 @@ impl World {
     /// Material of a custom arbiter: the maximum over the shapes of both bodies, or the defaults where neither has any.
     fn mix_body_materials(&mut self, index: u32) {
         let arbiter = self.arbiters.at(index);
-        let (mut friction, mut restitution, mut any) = (0.0, 0.0, false);
+        let (mut friction, mut restitution, mut rolling, mut any) = (0.0, 0.0, 0.0, false);
         for body in [arbiter.body1.index, arbiter.body2.index] {
             for &slot in &self.bodies[body as usize].shape_slots {
-                let material = &self.shapes[slot as usize].material;
-                friction = max(friction, material.friction);
-                restitution = max(restitution, material.restitution);
+                let shape = &self.shapes[slot as usize];
+                friction = max(friction, shape.material.friction);
+                restitution = max(restitution, shape.material.restitution);
+                let resistance = shape.material.rolling_resistance;
+                rolling = max(resistance * rolling_radius([&shape.geometry; 2], [resistance; 2]), rolling);
                 any = true;
             }
         }
@@ -261,6 +267,9 @@ impl World {
         }
         if data.flags & RESTITUTION_OVERRIDDEN == 0 {
             data.restitution = if any { restitution } else { default.restitution };
+        }
+        if data.flags & ROLLING_OVERRIDDEN == 0 {
+            data.rolling_resistance = rolling;
         }
     }
 
@@ -275,6 +284,12 @@ impl World {
             }
         }
     }
+}
+
+/// Velocity of the surface of body 1 against that of body 2, world axes.
+pub(crate) fn surface_velocity(materials: [&Material; 2], rotations: [Rotation; 2]) -> Vec3 {
+    let [a, b] = [0, 1].map(|side| rotations[side].rotate(materials[side].tangent_velocity));
+    a - b
 }
 
 /// Radius that rolls: that of the round shape, or for polyhedra with a resistance of their own a quarter of the inner radius.

@@ -10,17 +10,19 @@
 //! Pairs are independent: they run on all threads, each writing its own arbiter. What begins is gathered and sorted by key.
 
 use super::World;
+use super::arbiters::surface_velocity;
 use super::bodies::Body;
 use super::filters::UserFilters;
 use super::pairs::Pair;
 use super::settings::WorldSettings;
 use super::shapes::ShapeSlot;
-use crate::arbiter::{Arbiter, ArbiterKey, Contact, ContactData, EndReason, NONE, ONE_NORMAL, SLOTS};
+use crate::arbiter::{
+    Arbiter, ArbiterKey, Contact, ContactData, EndReason, NONE, ONE_NORMAL, SLOTS, TANGENT_VELOCITY_OVERRIDDEN,
+};
 use crate::math::{Pose, Real, Rotation, Vec3, max, min};
 use crate::narrow_phase::{Manifold, collide};
-use crate::parallel::SharedSlice;
+use crate::parallel::{Gather, SharedSlice};
 use crate::solver::SolverBodies;
-use std::sync::Mutex;
 
 /// Pairs that a thread takes at a time.
 const PAIRS_PER_BLOCK: usize = 64;
@@ -54,9 +56,10 @@ struct CollideContext<'a> {
 /// Buffers of the narrow phase, kept from step to step.
 #[derive(Debug, Default)]
 pub(crate) struct NarrowPhaseScratch {
-    news: Vec<News>,
+    news: Gather<News>,
     begins: Vec<(ArbiterKey, u32, Manifold)>,
     apart: Vec<u32>,
+    sensors: Vec<(u32, bool)>,
     /// Arbiters that may have nothing left.
     pub empty: Vec<u32>,
 }
@@ -66,16 +69,20 @@ impl World {
     pub(crate) fn collide_pairs(&mut self, dt: Real) {
         let mut scratch = std::mem::take(&mut self.narrow);
         scratch.empty.clear();
-        let news = Mutex::new(std::mem::take(&mut scratch.news));
-        self.run_pairs(dt, &news);
-        scratch.news = news.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
-        for item in scratch.news.drain(..) {
+        scratch.news.prepare(self.pool.threads(), PAIRS_PER_BLOCK);
+        self.run_pairs(dt, &scratch.news);
+        for item in scratch.news.list().drain(..) {
             match item {
                 News::Apart(pair) => scratch.apart.push(pair),
                 News::Begin(key, pair, manifold) => scratch.begins.push((key, pair, manifold)),
-                News::Sensor(pair, overlaps) => self.set_sensor_overlap(pair, overlaps),
+                News::Sensor(pair, overlaps) => scratch.sensors.push((pair, overlaps)),
                 News::Empty(arbiter) => scratch.empty.push(arbiter),
             }
+        }
+        // Threads report in any order; events and places must not depend on it.
+        scratch.sensors.sort_unstable_by_key(|&(pair, _)| self.pair_key(pair));
+        for (pair, overlaps) in scratch.sensors.drain(..) {
+            self.set_sensor_overlap(pair, overlaps);
         }
         scratch.apart.sort_unstable();
         for pair in scratch.apart.drain(..) {
@@ -89,7 +96,7 @@ impl World {
         self.narrow = scratch;
     }
 
-    fn run_pairs(&mut self, dt: Real, news: &Mutex<Vec<News>>) {
+    fn run_pairs(&mut self, dt: Real, news: &Gather<News>) {
         let context = CollideContext {
             shapes: &self.shapes,
             bodies: &self.bodies,
@@ -105,7 +112,7 @@ impl World {
         let arbiters = SharedSlice::new(self.arbiters.slots_mut());
         let blocks = active.len().div_ceil(PAIRS_PER_BLOCK);
         self.pool.run(blocks, |block| {
-            let mut found = Vec::new();
+            let mut found = news.block();
             let start = block * PAIRS_PER_BLOCK;
             for &index in &active[start..(start + PAIRS_PER_BLOCK).min(active.len())] {
                 // SAFETY: each active pair stands in the list once, and only this block visits it.
@@ -116,23 +123,28 @@ impl World {
                     found.push(item);
                 }
             }
-            if !found.is_empty() {
-                news.lock().unwrap_or_else(std::sync::PoisonError::into_inner).append(&mut found);
-            }
         });
+    }
+
+    fn pair_key(&self, pair: u32) -> ArbiterKey {
+        let [a, b] = self.pairs[pair as usize].shapes.map(|slot| self.shapes[slot as usize].id);
+        ArbiterKey::of_shapes(a, b)
     }
 
     /// Makes the arbiter of a pair that begins to touch.
     fn begin_pair(&mut self, key: ArbiterKey, pair_index: u32, manifold: &Manifold) {
-        if self.arbiters.find(key).is_some() {
-            return; // a user holds this key: the shapes collide through that arbiter
-        }
         let pair = &self.pairs[pair_index as usize];
         let [b1, b2] = pair.bodies;
         let [center1, center2] = [b1, b2].map(|body| self.solver_bodies.masses[body as usize].pose());
         let between = center1.relative(&center2);
         let reusable = self.filters.contact.is_none();
-        let index = self.create_arbiter(key, self.body_id(b1), self.body_id(b2));
+        let ids = [self.body_id(b1), self.body_id(b2)];
+        let index = match self.arbiters.find(key) {
+            None => self.create_arbiter(key, ids[0], ids[1]),
+            // The user has made an arbiter under the key of these shapes: it is theirs from now on.
+            Some(index) if [self.arbiters.at(index).body1, self.arbiters.at(index).body2] == ids => index,
+            Some(_) => return, // a key that was not reserved, in use between other bodies
+        };
         self.arbiters.at_mut(index).pair = pair_index;
         let pair = &mut self.pairs[pair_index as usize];
         (pair.arbiter, pair.has_manifold, pair.manifold_pose) = (index, reusable, between);
@@ -155,13 +167,16 @@ impl World {
 }
 
 impl CollideContext<'_> {
-    fn collide_pair(&self, index: u32, pair: &mut Pair, arbiter: Option<&mut Arbiter>) -> Option<News> {
+    fn collide_pair(&self, index: u32, pair: &mut Pair, mut arbiter: Option<&mut Arbiter>) -> Option<News> {
         if pair.shapes.iter().any(|&slot| self.moved[slot as usize]) && !self.boxes_overlap(pair) {
             return Some(News::Apart(index));
         }
         let [center1, center2] = pair.bodies.map(|body| self.solver.masses[body as usize].pose());
         let between = center1.relative(&center2);
-        if pair.has_manifold && pair.hardly_moved(&between) {
+        if let Some(arbiter) = arbiter.as_mut().filter(|_| pair.conveyor) {
+            self.turn_conveyor(pair, &mut arbiter.data);
+        }
+        if pair.has_manifold && self.may_reuse(pair, &between) {
             if let Some(arbiter) = arbiter.filter(|_| !pair.hardly_turned(center1.rotation)) {
                 pair.manifold_rotation = center1.rotation;
                 turn_levers(&mut arbiter.data, center1.rotation, center2.rotation);
@@ -170,6 +185,25 @@ impl CollideContext<'_> {
         }
         pair.manifold_rotation = center1.rotation;
         self.collide_anew(index, pair, &between, arbiter)
+    }
+
+    /// Surface velocities turn with their bodies.
+    fn turn_conveyor(&self, pair: &Pair, data: &mut ContactData) {
+        if data.flags & TANGENT_VELOCITY_OVERRIDDEN == 0 {
+            let materials = pair.shapes.map(|slot| &self.shapes[slot as usize].material);
+            let rotations = pair.bodies.map(|body| self.solver.masses[body as usize].rotation);
+            data.tangent_velocity = surface_velocity(materials, rotations);
+        }
+    }
+
+    /// Whether last time's manifold still holds, or last time's lack of one.
+    #[inline(always)]
+    fn may_reuse(&self, pair: &Pair, between: &Pose) -> bool {
+        if pair.arbiter != NONE {
+            return pair.hardly_moved(between);
+        }
+        let [v1, v2] = pair.bodies.map(|body| self.solver.states[body as usize].linear_velocity);
+        pair.still_apart(between, (v2 - v1).length() * self.dt, self.settings.speculative_distance)
     }
 
     /// Makes a new manifold.
@@ -194,6 +228,8 @@ impl CollideContext<'_> {
             update_contacts(&mut arbiter.data, &manifold, &frame, self.settings.contact_break_distance);
             return manifold.points().is_empty().then_some(News::Empty(pair.arbiter));
         }
+        pair.has_manifold = manifold.points().is_empty() && self.filters.contact.is_none();
+        pair.manifold_pose = *between;
         let key = ArbiterKey::of_shapes(s1.id, s2.id);
         self.begins(pair, &manifold, &frame).then_some(News::Begin(key, index, manifold))
     }

@@ -15,7 +15,7 @@
 use super::World;
 use super::definition::BodyKind;
 use super::shapes::ShapeSlot;
-use crate::math::{Pose, Real, Vec3, min};
+use crate::math::{Aabb, Pose, Real, Vec3, max, min};
 use crate::narrow_phase::{Support, Sweep, gap, time_of_impact};
 use crate::shape::{Capsule, Cuboid, MeshSides, Shape, Sphere, TriangleMesh};
 
@@ -57,10 +57,8 @@ impl World {
 
     /// Fraction of the path at which a shape first comes within a slop of a static one; `limit` if it does not.
     fn first_impact(&self, mover: &Mover<'_>, limit: Real) -> Real {
-        let geometry = &mover.shape.geometry;
-        let swept = geometry.aabb(&mover.path.start).union(&geometry.aabb(&mover.path.end));
         let mut first = limit;
-        self.broad_phase.query(&swept, |slot| {
+        self.broad_phase.query(&mover.swept_aabb(), |slot| {
             let other = &self.shapes[slot as usize];
             let body = &self.bodies[other.body as usize];
             if body.kind == BodyKind::Static && !other.sensor && mover.shape.filter.accepts(&other.filter) {
@@ -79,11 +77,9 @@ impl World {
 
     /// First impact with a triangle of a mesh, coming from its solid side; all in the mesh's frame.
     fn mesh_impact(&self, mesh: &TriangleMesh, mover: &Mover<'_>) -> Option<Real> {
-        let reach = mover.support.reach() + mover.support.radius();
         let (start, end) = (mover.path.start.position, mover.path.end.position);
-        let swept = crate::math::Aabb::from_points([start, end]).expand(reach);
         let mut first = None;
-        mesh.for_each_triangle(&swept, |corners, _| {
+        mesh.for_each_triangle(&mover.swept_aabb(), |corners, _| {
             let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
             let from_behind = mesh.sides() == MeshSides::One
                 && ((end - start).dot(normal) >= 0.0 || (start - corners[0]).dot(normal) < 0.0);
@@ -142,6 +138,15 @@ impl<'a> Mover<'a> {
         let core_path = Sweep { start: path.start.mul(&to_middle), end: path.end.mul(&to_middle) };
         let middle = Support::Sphere(Sphere::new(0.1 * thickness).ok()?);
         Some(Self { shape, support: Support::new(&shape.geometry)?, path, core, middle, core_path })
+    }
+
+    /// The box around all of the way. A point at radius `r` that turns by `θ` bulges out of the chord of its arc by
+    /// `r (1 − cos θ/2)`, and the dot product of the two rotations is that cosine.
+    fn swept_aabb(&self) -> Aabb {
+        let geometry = &self.shape.geometry;
+        let (start, end) = (&self.path.start, &self.path.end);
+        let bulge = self.support.reach() * max(1.0 - start.rotation.dot(end.rotation).abs(), 0.0);
+        geometry.aabb(start).union(&geometry.aabb(end)).expand(bulge)
     }
 
     /// The same seen from a frame at rest.

@@ -96,6 +96,12 @@ pub enum Error {
         /// Second body.
         body2: BodyId,
     },
+    /// An arbiter of a body that is disabled.
+    #[error("{id:?} is disabled: it takes no contacts until it is enabled again")]
+    BodyDisabled {
+        /// The body.
+        id: BodyId,
+    },
     /// The key is in use for other bodies.
     #[error("{key:?} is in use between {body1:?} and {body2:?}: use ids of your own from World::reserve_ids")]
     KeyInUse {

@@ -344,6 +344,10 @@ pub(crate) struct Events {
     pub unbegun: Vec<(ArbiterKey, ArbiterId)>,
     /// Ends whose listeners have not been called.
     pub pending_ends: Vec<EndEvent>,
+    /// The batch whose listeners are being called, while these make the next one: empty in between, kept for its memory.
+    spare_unbegun: Vec<(ArbiterKey, ArbiterId)>,
+    spare_ends: Vec<EndEvent>,
+    spare_removals: Vec<Removal>,
 }
 
 impl Events {
@@ -426,9 +430,10 @@ impl World {
     /// Raises the begin of all arbiters that are new, those made by listeners included.
     pub(crate) fn raise_begin(&mut self) {
         while !self.events.unbegun.is_empty() {
-            let mut new = std::mem::take(&mut self.events.unbegun);
-            new.sort_unstable();
-            for &(key, id) in &new {
+            let mut batch = std::mem::take(&mut self.events.spare_unbegun);
+            std::mem::swap(&mut batch, &mut self.events.unbegun);
+            batch.sort_unstable();
+            for (key, id) in batch.drain(..) {
                 let Some(arbiter) = self.arbiters.index_of(id).map(|index| self.arbiters.at_mut(index)) else {
                     continue; // removed before its begin: neither begin nor end
                 };
@@ -439,10 +444,7 @@ impl World {
                 listeners.begin(&mut StepContext::new(self), &event);
                 self.listeners = listeners;
             }
-            new.clear();
-            if self.events.unbegun.is_empty() {
-                self.events.unbegun = new; // keep the memory
-            }
+            self.events.spare_unbegun = batch;
         }
         self.flush_events();
     }
@@ -451,23 +453,23 @@ impl World {
     pub(crate) fn flush_events(&mut self) {
         loop {
             while !self.events.pending_ends.is_empty() {
-                let mut ended = std::mem::take(&mut self.events.pending_ends);
-                ended.sort_by_key(|event| (event.key, event.arbiter));
-                for event in &ended {
-                    self.events.end.events.push(*event);
+                let mut batch = std::mem::take(&mut self.events.spare_ends);
+                std::mem::swap(&mut batch, &mut self.events.pending_ends);
+                batch.sort_unstable_by_key(|event| (event.key, event.arbiter));
+                for event in batch.drain(..) {
+                    self.events.end.events.push(event);
                     let mut listeners = std::mem::take(&mut self.listeners);
-                    listeners.end(&mut StepContext::new(self), event);
+                    listeners.end(&mut StepContext::new(self), &event);
                     self.listeners = listeners;
                 }
-                ended.clear();
-                if self.events.pending_ends.is_empty() {
-                    self.events.pending_ends = ended;
-                }
+                self.events.spare_ends = batch;
             }
             if self.removals.is_empty() {
                 return;
             }
-            for removal in std::mem::take(&mut self.removals) {
+            let mut batch = std::mem::take(&mut self.events.spare_removals);
+            std::mem::swap(&mut batch, &mut self.removals);
+            for removal in batch.drain(..) {
                 // What is gone already was asked for twice: nothing is left to do.
                 match removal {
                     Removal::Body(id) => drop(self.remove_body(id)),
@@ -475,6 +477,7 @@ impl World {
                     Removal::Arbiter(id) => drop(self.remove_arbiter(id)),
                 }
             }
+            self.events.spare_removals = batch;
         }
     }
 }

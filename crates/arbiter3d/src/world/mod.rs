@@ -71,6 +71,8 @@ pub struct World {
     solver_bodies: SolverBodies,
     /// Awake dynamic and moving kinematic bodies, in no particular order.
     awake: Vec<u32>,
+    /// Whether that list has changed since the step made its own of it.
+    awake_changed: bool,
     shapes: Vec<shapes::ShapeSlot>,
     free_shapes: Vec<u32>,
     /// Shapes whose proxies have moved since the last narrow phase, by slot.
@@ -140,6 +142,7 @@ impl World {
             free_bodies: Vec::new(),
             solver_bodies: SolverBodies::default(),
             awake: Vec::new(),
+            awake_changed: false,
             shapes: Vec::new(),
             free_shapes: Vec::new(),
             moved_shapes: Vec::new(),

@@ -7,7 +7,7 @@
 use super::World;
 use super::definition::BodyKind;
 use crate::arbiter::{EndReason, NONE};
-use crate::math::{Pose, Real, Rotation, max, min};
+use crate::math::{Pose, Real, Rotation, Vec3, max, min};
 use crate::narrow_phase::PairCache;
 
 /// What the world keeps of a pair. Shape 1 has the smaller id.
@@ -21,6 +21,8 @@ pub(crate) struct Pair {
     pub active_place: u32,
     pub alive: bool,
     pub sensor: bool,
+    /// Whether a surface of the two moves along itself: its direction turns with its body.
+    pub conveyor: bool,
     /// For sensors: whether the shapes overlap.
     pub overlapping: bool,
     /// Whether `manifold_pose` holds: cleared by teleports and edits.
@@ -31,6 +33,8 @@ pub(crate) struct Pair {
     pub manifold_rotation: Rotation,
     /// How far the pair may move (metres) before its manifold is made anew.
     reuse_distance: Real,
+    /// How far a pair without contact may turn (sine of half the angle) until its shapes are looked at again.
+    apart_rotation: Real,
     pub cache: PairCache,
     next: [u32; 2],
     previous: [u32; 2],
@@ -52,6 +56,19 @@ impl Pair {
         let turned = old.rotation.conjugate().mul(between.rotation).vector();
         moved.length_squared() < self.reuse_distance * self.reuse_distance
             && turned.length_squared() < REUSE_ROTATION * REUSE_ROTATION
+    }
+
+    /// Whether a pair whose shapes were more than a speculative distance apart, and now close by `closing` in a step, is still
+    /// too far apart to touch within it: half the distance is left for moving and turning, half for closing.
+    #[inline(always)]
+    pub fn still_apart(&self, between: &Pose, closing: Real, speculative_distance: Real) -> bool {
+        let old = &self.manifold_pose;
+        let moved = between.position - old.position;
+        let turned = old.rotation.conjugate().mul(between.rotation).vector();
+        let limit = 0.25 * speculative_distance;
+        closing < 2.0 * limit
+            && moved.length_squared() < limit * limit
+            && turned.length_squared() < self.apart_rotation * self.apart_rotation
     }
 
     /// Whether body 1 has turned so little that normal and levers may stay as they are.
@@ -87,6 +104,7 @@ impl World {
         let smaller_first = self.shapes[a as usize].id < self.shapes[b as usize].id;
         let shapes = if smaller_first { [a, b] } else { [b, a] };
         let bodies = shapes.map(|slot| self.shapes[slot as usize].body);
+        let reach = |side: usize| self.bodies[bodies[side] as usize].reach;
         let pair = Pair {
             shapes,
             bodies,
@@ -94,11 +112,13 @@ impl World {
             active_place: NONE,
             alive: true,
             sensor: shapes.iter().any(|&slot| self.shapes[slot as usize].sensor),
+            conveyor: shapes.iter().any(|&slot| self.shapes[slot as usize].material.tangent_velocity != Vec3::ZERO),
             overlapping: false,
             has_manifold: false,
             manifold_pose: Pose::IDENTITY,
             manifold_rotation: Rotation::IDENTITY,
             reuse_distance: self.reuse_distance(shapes),
+            apart_rotation: self.scaled.speculative_distance / (8.0 * max(reach(0), reach(1))),
             cache: PairCache::default(),
             next: [NONE; 2],
             previous: [NONE; 2],

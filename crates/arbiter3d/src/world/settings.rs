@@ -29,9 +29,9 @@ pub struct WorldSettings {
     /// Gap or tangential drift at which a cached contact breaks, and radius within which a new one replaces it.
     /// Default 0.02 m.
     pub contact_break_distance: Real,
-    /// Stiffness of contacts, Hz; limited to an eighth of the substep rate. Default 30.
+    /// Stiffness of contacts, Hz; limited to 0.1875 of the substep rate. Default 45.
     pub contact_hertz: Real,
-    /// Damping ratio of contacts. Default 10.
+    /// Damping ratio of contacts. Default 3.
     pub contact_damping_ratio: Real,
     /// Speed limit at which overlapping bodies are pushed apart. Default 3 m/s.
     pub push_out_speed: Real,
@@ -62,8 +62,8 @@ impl Default for WorldSettings {
             slop: 0.005,
             speculative_distance: 0.02,
             contact_break_distance: 0.02,
-            contact_hertz: 30.0,
-            contact_damping_ratio: 10.0,
+            contact_hertz: 45.0,
+            contact_damping_ratio: 3.0,
             push_out_speed: 3.0,
             restitution_threshold: 1.0,
             max_linear_speed: 1000.0,

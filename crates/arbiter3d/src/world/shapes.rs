@@ -164,7 +164,7 @@ impl<'a> ShapeMut<'a> {
     /// Changes which shapes it meets; arbiters that this rules out end at once, and the bodies wake.
     pub fn set_filter(&mut self, filter: Filter) {
         self.slot().filter = filter;
-        self.world.renew_proxy(self.slot, EndReason::FilterChanged);
+        self.world.refilter(self.slot);
         self.world.flush_events();
     }
 
@@ -241,7 +241,11 @@ impl World {
             self.add_proxy(slot);
         }
         self.update_mass(index);
-        self.wake(index);
+        // A body that was added asleep sleeps on with its first shape; later ones change what rests on what.
+        let body = &self.bodies[index as usize];
+        if body.awake || body.shapes.len() > 1 {
+            self.wake(index);
+        }
         Ok(id)
     }
 
@@ -311,6 +315,21 @@ impl World {
             self.remove_pair(pair, reason);
         }
         self.broad_phase.remove(slot);
+    }
+
+    /// Ends the pairs of a shape that its filter no longer lets be, and finds those that it lets be now.
+    fn refilter(&mut self, slot: u32) {
+        let body = self.shapes[slot as usize].body;
+        let ruled_out = |pair: &u32| {
+            let [a, b] = self.pairs[*pair as usize].shapes;
+            (a == slot || b == slot) && !self.may_pair(a, b)
+        };
+        let pairs: Vec<u32> = self.pairs_of_body(body).filter(ruled_out).collect();
+        for pair in pairs {
+            self.remove_pair(pair, EndReason::FilterChanged);
+        }
+        self.broad_phase.touch(slot);
+        self.wake(body);
     }
 
     /// Finds the pairs of a shape anew.

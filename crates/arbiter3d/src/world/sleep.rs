@@ -71,6 +71,7 @@ impl World {
         }
         body.awake = true;
         body.awake_place = place;
+        self.awake_changed = true;
         self.awake.push(index);
         let mut edges = std::mem::take(&mut self.index_scratch);
         edges.extend(self.pairs_of_body(index));
@@ -91,6 +92,7 @@ impl World {
             return;
         }
         body.awake = false;
+        self.awake_changed = true;
         let state = &mut self.solver_bodies.states[index as usize];
         (state.translation, state.turn) = (Vec3::ZERO, Vec3::ZERO);
         let place = std::mem::replace(&mut body.awake_place, NONE);

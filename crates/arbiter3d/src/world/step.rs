@@ -7,15 +7,17 @@ use super::id::BodyId;
 use super::timings::{Phase, PhaseClock};
 use crate::arbiter::{EndReason, NONE};
 use crate::math::{Aabb, Real, Vec3, min};
-use crate::parallel::SharedSlice;
+use crate::parallel::{BlockList, Gather, SharedSlice};
 use crate::solver::{
     IntegrateParameters, Pass, PassParameters, PrepareContext, Softness, StoreTarget, integrate_position,
     integrate_velocity,
 };
-use std::sync::Mutex;
 
 /// Bodies that a thread takes at a time.
 const BODIES_PER_BLOCK: usize = 128;
+
+/// Stiffest spring of a contact, as a share of the substep rate: past it, tall stacks ring.
+const MAX_CONTACT_RATE: Real = 0.1875;
 
 /// What a step has to report beyond events.
 ///
@@ -48,9 +50,12 @@ enum BodyNews {
 pub(crate) struct StepScratch {
     pairs: Vec<(u32, u32)>,
     may_break: Vec<bool>,
-    news: Vec<BodyNews>,
+    news: Gather<BodyNews>,
     moved: Vec<u32>,
+    /// Bodies that this step integrates.
     sorted_awake: Vec<u32>,
+    /// Memory for the list with the woken ones.
+    admitted: Vec<u32>,
 }
 
 impl StepScratch {
@@ -74,13 +79,14 @@ impl World {
         let mut clock = PhaseClock::start();
         self.events.begin_step();
         self.flush_events();
-        self.apply_forces(dt);
+        self.apply_forces();
         self.find_pairs();
         clock.mark(Phase::BroadPhase);
         self.collide_pairs(dt);
         self.call_providers();
         clock.mark(Phase::NarrowPhase);
         self.raise_begin();
+        self.admit_woken();
         clock.mark(Phase::BeginEvents);
         self.plan_rows();
         clock.mark(Phase::Coloring);
@@ -106,25 +112,49 @@ impl World {
         Ok(report)
     }
 
-    /// Turns gravity and forces into this step's accelerations.
-    fn apply_forces(&mut self, dt: Real) {
-        self.scratch.sorted_awake.clone_from(&self.awake);
-        self.scratch.sorted_awake.sort_unstable();
-        let gravity = self.settings.gravity;
-        for &index in &self.scratch.sorted_awake {
-            let body = &mut self.bodies[index as usize];
-            let motion = &mut self.solver_bodies.motions[index as usize];
-            let mass = &self.solver_bodies.masses[index as usize];
-            let (free, _) = body.locked_axes.free();
-            let dynamic = !motion.kinematic && !body.frozen;
-            motion.acceleration =
-                if dynamic { gravity * body.gravity_scale * free + mass.inverse_mass * body.force } else { Vec3::ZERO };
-            motion.angular_acceleration = if dynamic { mass.inverse_inertia.mul(body.torque) } else { Vec3::ZERO };
-            (body.force, body.torque) = (Vec3::ZERO, Vec3::ZERO);
-            let state = &mut self.solver_bodies.states[index as usize];
-            (state.translation, state.turn, state.constrained) = (Vec3::ZERO, Vec3::ZERO, 0);
+    /// Lists the awake bodies and turns gravity and their forces into this step's accelerations.
+    fn apply_forces(&mut self) {
+        let mut list = std::mem::take(&mut self.scratch.sorted_awake);
+        list.clone_from(&self.awake);
+        list.sort_unstable();
+        for &index in &list {
+            self.accelerate(index);
         }
-        let _ = dt;
+        self.scratch.sorted_awake = list;
+        self.awake_changed = false;
+    }
+
+    /// Lets bodies that contacts have woken take part in the step in full, and drops those that listeners have removed. What
+    /// is solved but not integrated would lose the impulses that it is warm started with.
+    fn admit_woken(&mut self) {
+        if !std::mem::take(&mut self.awake_changed) {
+            return;
+        }
+        let mut list = std::mem::take(&mut self.scratch.admitted);
+        list.clone_from(&self.awake);
+        list.sort_unstable();
+        for &index in &list {
+            if self.scratch.sorted_awake.binary_search(&index).is_err() {
+                self.accelerate(index);
+            }
+        }
+        std::mem::swap(&mut list, &mut self.scratch.sorted_awake);
+        self.scratch.admitted = list;
+    }
+
+    /// Turns gravity and the forces on a body into its accelerations, and starts its motion of this step at zero.
+    fn accelerate(&mut self, index: u32) {
+        let body = &mut self.bodies[index as usize];
+        let motion = &mut self.solver_bodies.motions[index as usize];
+        let mass = &self.solver_bodies.masses[index as usize];
+        let (free, _) = body.locked_axes.free();
+        let dynamic = !motion.kinematic && !body.frozen;
+        let gravity = self.settings.gravity * body.gravity_scale * free;
+        motion.acceleration = if dynamic { gravity + mass.inverse_mass * body.force } else { Vec3::ZERO };
+        motion.angular_acceleration = if dynamic { mass.inverse_inertia.mul(body.torque) } else { Vec3::ZERO };
+        (body.force, body.torque) = (Vec3::ZERO, Vec3::ZERO);
+        let state = &mut self.solver_bodies.states[index as usize];
+        (state.translation, state.turn, state.constrained) = (Vec3::ZERO, Vec3::ZERO, 0);
     }
 
     /// Finds the pairs of shapes that have moved.
@@ -172,15 +202,11 @@ impl World {
     fn solve(&mut self, dt: Real) {
         let settings = self.scaled;
         let substep = dt / settings.substeps as Real;
-        let hertz = min(settings.contact_hertz, 0.125 / substep);
-        // Against the ground twice as stiff: what stands on it has the weight of all above. And so for deep overlaps.
-        let stiff = Softness::new(2.0 * hertz, 0.5 * settings.contact_damping_ratio, substep);
+        let hertz = min(settings.contact_hertz, MAX_CONTACT_RATE / substep);
         let pass = |softness: Softness| PassParameters {
             inverse_substep: 1.0 / substep,
             push_out_speed: settings.push_out_speed,
             softness,
-            deep_softness: stiff,
-            slop: settings.slop,
             restitution_threshold: settings.restitution_threshold,
         };
         // Against the ground twice as stiff: what stands on it has the weight of all above.
@@ -257,14 +283,16 @@ impl World {
 
     /// New poses, boxes and rest times; then continuous collision for the fast.
     fn finalize(&mut self, dt: Real, report: &mut StepReport) {
-        let news = Mutex::new(std::mem::take(&mut self.scratch.news));
-        self.finalize_bodies(dt, &news);
-        let mut news = news.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut gather = std::mem::take(&mut self.scratch.news);
+        gather.prepare(self.pool.threads(), BODIES_PER_BLOCK);
+        self.finalize_bodies(dt, &gather);
+        let news = gather.list();
         // Threads report in any order; the trees and the report must not depend on it.
         news.sort_unstable_by_key(|item| match *item {
             BodyNews::Broken(body) => (0, body),
-            BodyNews::Fast(body) => (1, body),
-            BodyNews::Moved { shape, .. } => (2, shape),
+            // Before the fast: a body that is stopped short moves its boxes back.
+            BodyNews::Moved { shape, .. } => (1, shape),
+            BodyNews::Fast(body) => (2, body),
         });
         for item in news.drain(..) {
             match item {
@@ -281,10 +309,10 @@ impl World {
                 }
             }
         }
-        self.scratch.news = news;
+        self.scratch.news = gather;
     }
 
-    fn finalize_bodies(&mut self, dt: Real, news: &Mutex<Vec<BodyNews>>) {
+    fn finalize_bodies(&mut self, dt: Real, news: &Gather<BodyNews>) {
         let awake = &self.scratch.sorted_awake;
         let world =
             FinalizeContext { shapes: &self.shapes, broad_phase: &self.broad_phase, settings: &self.scaled, dt };
@@ -293,16 +321,13 @@ impl World {
         let motions = SharedSlice::new(&mut self.solver_bodies.motions);
         let masses = SharedSlice::new(&mut self.solver_bodies.masses);
         self.pool.run(awake.len().div_ceil(BODIES_PER_BLOCK), |block| {
-            let mut found = Vec::new();
+            let mut found = news.block();
             for &index in block_of(awake, block) {
                 let at = index as usize;
                 // SAFETY: a body stands in the list once.
                 let (body, state, motion, mass) =
                     unsafe { (bodies.get_mut(at), states.get_mut(at), motions.get_mut(at), masses.get_mut(at)) };
                 world.finalize_body(index, (body, state, motion, mass), &mut found);
-            }
-            if !found.is_empty() {
-                news.lock().unwrap_or_else(std::sync::PoisonError::into_inner).append(&mut found);
             }
         });
     }
@@ -381,7 +406,7 @@ impl FinalizeContext<'_> {
             &mut crate::solver::BodyMotion,
             &mut crate::solver::BodyMass,
         ),
-        news: &mut Vec<BodyNews>,
+        news: &mut BlockList<'_, BodyNews>,
     ) {
         let center = mass.center + state.translation;
         let finite = center.is_finite()
@@ -414,7 +439,13 @@ impl FinalizeContext<'_> {
 
     /// Reports a shape whose box has left its fat box. Boxes of fast shapes reach ahead, so that what they will touch within
     /// the next step is found now.
-    fn update_box(&self, slot: u32, body: &super::bodies::Body, displacement: Vec3, news: &mut Vec<BodyNews>) {
+    fn update_box(
+        &self,
+        slot: u32,
+        body: &super::bodies::Body,
+        displacement: Vec3,
+        news: &mut BlockList<'_, BodyNews>,
+    ) {
         let shape = &self.shapes[slot as usize];
         let tight = shape.geometry.aabb(&body.pose.mul(&shape.pose));
         let speculative = self.settings.speculative_distance;

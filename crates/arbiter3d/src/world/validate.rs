@@ -47,7 +47,7 @@ impl World {
             if body.enabled && body.is_dynamic() && body.awake == (body.island != NONE) {
                 return Err(format!("body {index}: awake {} and in island {}", body.awake, body.island));
             }
-            if body.island != NONE && !self.sleeping.bodies(body.island).contains(&(index as u32)) {
+            if body.island != NONE && !self.sleeping.bodies(body.island).any(|other| other as usize == index) {
                 return Err(format!("body {index} is missing from island {}", body.island));
             }
             for (id, slot) in body.shapes.iter().zip(&body.shape_slots) {

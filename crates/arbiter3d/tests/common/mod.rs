@@ -59,10 +59,10 @@ pub fn wedge(half: f32) -> Shape {
     Shape::hull(&[&low[..], &[Vec3::new(-h, h, -h), Vec3::new(-h, h, h)]].concat()).unwrap()
 }
 
-/// A level floor at height zero, 400 m wide.
+/// A level floor at height zero, 400 m wide, without rolling resistance of its own.
 pub fn floor(world: &mut World, friction: f32) -> ShapeId {
     let ground = ShapeDefinition::new(cuboid(200.0, 1.0, 200.0)).at(Vec3::new(0.0, -1.0, 0.0));
-    world.add_shape(BodyId::WORLD, &ground.friction(friction)).unwrap()
+    world.add_shape(BodyId::WORLD, &ground.friction(friction).rolling_resistance(0.0)).unwrap()
 }
 
 /// Adds a body with one shape.
