@@ -184,9 +184,9 @@ pub(crate) unsafe fn restitute<const L: usize, const P: usize, const C: usize>(
             let delta = new - old;
             row.impulses[i] = new;
             friction.totals[i] += delta;
-            for j in 0..P {
+            for (j, velocity) in velocities.iter_mut().enumerate() {
                 let response = if i == j { own[i] } else { row.coupling[pair_of::<P>(i.min(j), i.max(j))] };
-                velocities[j] += response * delta;
+                *velocity += response * delta;
             }
             sum.add_point(row, i, delta);
         }
