@@ -34,7 +34,7 @@ pub use timings::{Phase, Timings};
 use crate::arbiter::{ArbiterStore, EndReason, IdMap, NONE};
 use crate::broad_phase::{BroadPhase, PairSet};
 use crate::island::{IslandFinder, SleepingIslands};
-use crate::math::Pose;
+use crate::math::{Pose, Real};
 use crate::parallel::StagePool;
 use crate::simd::SimdLevel;
 use crate::solver::{ContactSolver, RowPlan, SolverBodies, contact_solver};
@@ -66,6 +66,8 @@ pub struct World {
     /// Where generations start, so that ids of one world are unlikely to be taken for another's.
     tag: u32,
     next_id: u64,
+    /// Seconds of the last step.
+    dt: Real,
     bodies: Vec<Body>,
     free_bodies: Vec<u32>,
     solver_bodies: SolverBodies,
@@ -138,6 +140,7 @@ impl World {
             scaled: settings.scaled(),
             tag,
             next_id: 1,
+            dt: 0.0,
             bodies: vec![Body::new(0)],
             free_bodies: Vec::new(),
             solver_bodies: SolverBodies::default(),

@@ -66,7 +66,7 @@ impl StepScratch {
 }
 
 impl World {
-    /// Advances the world by `dt` seconds. Zero does nothing.
+    /// Advances the world by `dt` seconds. Zero, or less than a nanosecond, does nothing.
     ///
     /// # Errors
     /// If `dt` is not finite, negative, or longer than a second.
@@ -76,6 +76,7 @@ impl World {
         if dt < 1e-9 {
             return Ok(report);
         }
+        self.dt = dt;
         let mut clock = PhaseClock::start();
         self.events.begin_step();
         self.flush_events();
