@@ -24,6 +24,8 @@
 
 mod arbiter;
 mod broad_phase;
+#[cfg(doctest)]
+mod guide;
 mod island;
 pub mod math;
 pub mod narrow_phase;
