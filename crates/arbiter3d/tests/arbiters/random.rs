@@ -69,11 +69,11 @@ fn act(world: &mut World, dice: &mut Dice, keys: &std::ops::Range<u64>) {
         16 => drop(world.body_mut(body).unwrap().set_linear_velocity(at - Vec3::ONE)),
         17 => {
             let filter = Filter { mask: dice.roll(2), group: dice.roll(3) as i32 - 1, ..Filter::default() };
-            drop(shape.and_then(|shape| world.shape_mut(shape)).map(|mut shape| shape.set_filter(filter)));
+            let _ = shape.and_then(|shape| world.shape_mut(shape)).map(|mut shape| shape.set_filter(filter));
         }
         18 => {
             let sensor = dice.roll(2) == 0;
-            drop(shape.and_then(|shape| world.shape_mut(shape)).map(|mut shape| shape.set_sensor(sensor)));
+            let _ = shape.and_then(|shape| world.shape_mut(shape)).map(|mut shape| shape.set_sensor(sensor));
         }
         19 => {
             if let Some(arbiter) = dice.pick(&arbiters).and_then(|id| world.arbiter_mut(id)) {
@@ -97,7 +97,7 @@ fn add_meddlers(world: &mut World, seed: u64, keys: &std::ops::Range<u64>) {
             1 => drop(context.remove_body(b2)),
             2 => {
                 let first = context.world().arbiters().map(Arbiter::id).min();
-                drop(first.map(|id| context.remove_arbiter(id)));
+                let _ = first.map(|id| context.remove_arbiter(id));
             }
             3 | 4 => {
                 let at = dice.place();
@@ -106,7 +106,7 @@ fn add_meddlers(world: &mut World, seed: u64, keys: &std::ops::Range<u64>) {
             }
             5 => {
                 let shape = context.body(b2).and_then(|body| body.shapes().first().copied());
-                drop(shape.map(|shape| context.remove_shape(shape)));
+                let _ = shape.map(|shape| context.remove_shape(shape));
             }
             _ => {}
         }
@@ -130,7 +130,7 @@ fn run(seed: u64, threads: usize) -> (u64, usize) {
     let (begin, end) = (heard.clone(), heard.clone());
     world.on_begin_collide(Box::new(move |_, id| begin.push((id, true))));
     world.on_end_collide(Box::new(move |_, event| end.push((event.arbiter, false))));
-    if seed % 3 > 0 {
+    if !seed.is_multiple_of(3) {
         add_meddlers(&mut world, seed, &keys);
     }
     let mut dice = Dice(seed);
