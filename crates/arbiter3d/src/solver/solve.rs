@@ -19,7 +19,7 @@
 //! centre of its points: two tangents limited by a circular cone, a twist about the normal limited by the levers of the
 //! points.
 
-use super::bodies::{SharedStates, WideVelocity, gather, scatter};
+use super::bodies::{SharedStates, WideDisplacement, WideVelocity, gather, scatter};
 use super::rows::{FrictionRow, NormalRow};
 use crate::math::Real;
 use crate::simd::{Wide, WideVec3};
@@ -99,11 +99,7 @@ pub(crate) unsafe fn solve<const L: usize, const P: usize, const C: usize>(
     let (mut v1, d1) = unsafe { gather(states, &row.body1) };
     // SAFETY: promised by the caller.
     let (mut v2, d2) = unsafe { gather(states, &row.body2) };
-    let approach = row.normal.dot(&(d2.translation - d1.translation));
-    let separations: [Wide<L>; P] = std::array::from_fn(|i| {
-        let point = &row.points[i];
-        point.separation + approach + point.arm2.dot(&d2.turn) - point.arm1.dot(&d1.turn)
-    });
+    let separations = separations(row, &d1, &d2);
     solve_normals::<L, P, C, true>(row, &separations, &mut v1, &mut v2, pass);
     // SAFETY: promised by the caller.
     unsafe { scatter(states, &row.body1, &v1) };
@@ -126,11 +122,7 @@ pub(crate) unsafe fn relax<const L: usize, const P: usize, const C: usize>(
     let (mut v1, d1) = unsafe { gather(states, &row.body1) };
     // SAFETY: promised by the caller.
     let (mut v2, d2) = unsafe { gather(states, &row.body2) };
-    let approach = row.normal.dot(&(d2.translation - d1.translation));
-    let separations: [Wide<L>; P] = std::array::from_fn(|i| {
-        let point = &row.points[i];
-        point.separation + approach + point.arm2.dot(&d2.turn) - point.arm1.dot(&d1.turn)
-    });
+    let separations = separations(row, &d1, &d2);
     solve_normals::<L, P, C, false>(row, &separations, &mut v1, &mut v2, pass);
     let mut load = Wide::ZERO;
     let mut twist_load = Wide::ZERO;
@@ -207,6 +199,20 @@ const RESTITUTION_SWEEPS: usize = 8;
 #[inline(always)]
 const fn pair_of<const P: usize>(i: usize, j: usize) -> usize {
     i * P - i * (i + 1) / 2 + j - i - 1
+}
+
+/// Gap at each point now, to first order in the displacements of the step.
+#[inline(always)]
+fn separations<const L: usize, const P: usize, const C: usize>(
+    row: &NormalRow<L, P, C>,
+    d1: &WideDisplacement<L>,
+    d2: &WideDisplacement<L>,
+) -> [Wide<L>; P] {
+    let approach = row.normal.dot(&(d2.translation - d1.translation));
+    std::array::from_fn(|i| {
+        let point = &row.points[i];
+        point.separation + approach + point.arm2.dot(&d2.turn) - point.arm1.dot(&d1.turn)
+    })
 }
 
 /// Normal velocity at each point.

@@ -2,13 +2,13 @@
 
 use super::World;
 use super::definition::Material;
-use super::error::{Error, finite_vec, unit_vec};
 use super::events::EndEvent;
-use super::id::BodyId;
 use crate::arbiter::{
     Arbiter, ArbiterId, ArbiterKey, Contact, ContactPoint, EndReason, FRICTION_OVERRIDDEN, NONE,
     RESTITUTION_OVERRIDDEN, ROLLING_OVERRIDDEN, SolveMode, TANGENT_VELOCITY_OVERRIDDEN,
 };
+use crate::error::{Error, finite_vec, unit_vec};
+use crate::id::BodyId;
 use crate::math::{Real, Rotation, Vec3, max};
 use crate::shape::Shape;
 use std::ops::Range;

@@ -9,10 +9,10 @@
 
 use super::World;
 use super::bodies::BodyRef;
-use super::error::Error;
-use super::id::{BodyId, ShapeId};
 use super::shapes::ShapeRef;
 use crate::arbiter::{Arbiter, ArbiterId, ArbiterKey, ContactData, ContactPoint, EndReason, IdMap};
+use crate::error::Error;
+use crate::id::{BodyId, ShapeId};
 use crate::math::{Aabb, Real};
 
 /// An arbiter has begun.

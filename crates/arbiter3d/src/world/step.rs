@@ -2,10 +2,10 @@
 
 use super::World;
 use super::bodies::world_inverse_inertia;
-use super::error::{Error, in_range};
-use super::id::BodyId;
 use super::timings::{Phase, PhaseClock};
 use crate::arbiter::{EndReason, NONE};
+use crate::error::{Error, in_range};
+use crate::id::BodyId;
 use crate::math::{Aabb, Real, Vec3, min};
 use crate::parallel::{BlockList, Gather, SharedSlice};
 use crate::solver::{
