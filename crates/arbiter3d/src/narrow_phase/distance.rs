@@ -71,16 +71,18 @@ impl<'a> Support<'a> {
         }
     }
 
-    /// Largest distance of a point of the shape from the origin of its frame, metres.
-    pub(crate) fn reach(&self) -> Real {
-        let longest = |points: &[Vec3]| points.iter().fold(0.0, |m, p| crate::math::max(p.length_squared(), m)).sqrt();
-        match self {
+    /// Largest distance of a point of the shape from `pivot`, a point in its frame, metres.
+    pub(crate) fn reach(&self, pivot: Vec3) -> Real {
+        let squared = |p: &Vec3| (*p - pivot).length_squared();
+        let longest = |points: &[Vec3]| points.iter().fold(0.0, |m, p| crate::math::max(squared(p), m)).sqrt();
+        let around_origin = match self {
             Self::Sphere(s) => s.radius(),
             Self::Capsule(s) => s.half_length() + s.radius(),
             Self::Cuboid(s) => s.half_extents().length(),
-            Self::Hull(s) => longest(s.vertices()),
-            Self::Triangle(corners) => longest(corners),
-        }
+            Self::Hull(s) => return longest(s.vertices()),
+            Self::Triangle(corners) => return longest(corners),
+        };
+        around_origin + pivot.length()
     }
 }
 

@@ -5,8 +5,8 @@
 //! however many triangles the box lies on: a corner of a right angle is extreme along at least one of eight directions.
 //!
 //! At the end the groups are merged, nearest normals first, until there are at most four. Every group gives its deepest
-//! point; the remaining places go where they add most: the square of a length for the second point of a group, twice
-//! the area for the third and the fourth. So a box on a floor keeps its four corners, a box in a groove two on each side.
+//! point; the remaining places go where they add most, points that touch before those that do not: the square of a length
+//! for the second point of a group, twice the area for the third and the fourth. So a box on a floor keeps its four corners, a box in a groove two on each side.
 
 use crate::math::{Real, Vec3, tangents};
 
@@ -37,6 +37,16 @@ const MERGE: [Real; 6] = [0.99, 0.9, 0.5, 0.0, -0.5, -2.0];
 const EQUALLY_DEEP: Real = 0.02;
 /// Another choice must be better by this share, so that rounding does not swap equal ones from step to step.
 const TIE: Real = 1.000_001;
+
+/// A point that touches goes before one that stands off (the ends of a ridge before the corners that lean over it) if
+/// it adds at least this share of what that would.
+const BEARING_SHARE: Real = 0.05;
+/// A group stands off that is farther than the nearest by this many tolerances.
+const STANDS_OFF: Real = 2.5;
+/// A fourth point that adds less to the area of three than this share is not worth moving one for.
+const WORTH_WIDENING: Real = 0.1;
+/// Mask of all groups.
+const ALL_GROUPS: u8 = u8::MAX;
 
 /// The points found so far.
 pub(super) struct Candidates {
@@ -92,15 +102,59 @@ impl Candidates {
         for group in 0..groups.count {
             chosen.add(group, self.deepest_of(&groups, group));
         }
+        let (touching, limit) = self.touching(&chosen, groups.count);
         for _ in groups.count..4 {
-            let Some((group, index)) = self.most_useful(&groups, &chosen) else { break };
+            let bearing = self.most_useful(&groups, &chosen, touching, limit);
+            let widest = self.most_useful(&groups, &chosen, touching, Real::MAX);
+            let next = match (bearing, widest) {
+                (Some(bearing), Some(widest)) if bearing.2 >= BEARING_SHARE * widest.2 => Some(bearing),
+                (_, Some(widest)) => Some(widest),
+                _ => self.most_useful(&groups, &chosen, ALL_GROUPS, Real::MAX),
+            };
+            let Some((group, index, _)) = next else { break };
             chosen.add(group, index);
         }
         for group in 0..groups.count {
-            for &index in &chosen.points[group][..chosen.counts[group]] {
-                take(&self.list[index]);
+            let widened = if groups.count > 1 { self.widened(&groups, &chosen, group) } else { None };
+            for (k, &index) in chosen.points[group][..chosen.counts[group]].iter().enumerate() {
+                match widened {
+                    Some((place, candidate)) if place == k => take(&candidate),
+                    _ => take(&self.list[index]),
+                }
             }
         }
+    }
+
+    /// The groups that come about as near as the nearest one, a bit for each, and the separation up to which points do:
+    /// what stands off (a wall beside a box on a floor) bears nothing yet, and one point is enough to stop at it.
+    fn touching(&self, chosen: &Chosen, groups: usize) -> (u8, Real) {
+        let nearest = |group: usize| self.list[chosen.points[group][0]].separation;
+        let least = (0..groups).fold(Real::MAX, |m, group| crate::math::min(m, nearest(group)));
+        let limit = crate::math::max(least, 0.0) + STANDS_OFF * self.tolerance;
+        ((0..groups).filter(|&group| nearest(group) <= limit).fold(0, |mask, group| mask | 1 << group), limit)
+    }
+
+    /// Where only three places were left for a patch of four corners, the middle between the fourth and its nearest
+    /// neighbour takes the place of that neighbour: three corners alone would leave a box to rock over their longest side.
+    fn widened(&self, groups: &Groups, chosen: &Chosen, group: usize) -> Option<(usize, Candidate)> {
+        if chosen.counts[group] != 3 {
+            return None;
+        }
+        let [a, b, c] = [0, 1, 2].map(|k| &self.list[chosen.points[group][k]]);
+        let area = groups.normals[group].dot((b.position - a.position).cross(c.position - a.position)).abs();
+        let (_, fourth, gain) = self.most_useful(groups, chosen, 1 << group, Real::MAX)?;
+        let fourth = &self.list[fourth];
+        if gain < WORTH_WIDENING * area {
+            return None;
+        }
+        // The first is the deepest, which stays.
+        let far = |other: &Candidate| (other.position - fourth.position).length_squared();
+        let (place, other) = if far(c) * TIE < far(b) { (2, c) } else { (1, b) };
+        if other.normal != fourth.normal {
+            return None;
+        }
+        let position = (other.position + fourth.position) * 0.5;
+        Some((place, Candidate { position, separation: (other.separation + fourth.separation) * 0.5, ..*other }))
     }
 
     /// Gives points with almost the same normal the very same, that of a triangle if there is one among them.
@@ -172,17 +226,20 @@ impl Candidates {
         best.0
     }
 
-    /// The point that adds most to its group.
-    fn most_useful(&self, groups: &Groups, chosen: &Chosen) -> Option<(usize, usize)> {
+    /// The point up to `limit` that adds most to its group, of the groups in the bit mask: group, index and gain.
+    fn most_useful(&self, groups: &Groups, chosen: &Chosen, mask: u8, limit: Real) -> Option<(usize, usize, Real)> {
         let mut best = None;
         let mut most = self.tolerance * self.tolerance;
         for (i, candidate) in self.list[..self.count].iter().enumerate() {
             let group = groups.of[i] as usize;
+            if mask >> group & 1 == 0 || candidate.separation > limit {
+                continue;
+            }
             let corners = chosen.points[group].map(|j| self.list[j].position);
             let gain = gain(&corners[..chosen.counts[group]], candidate.position, groups.normals[group]);
             if gain > most * TIE {
                 most = gain;
-                best = Some((group, i));
+                best = Some((group, i, gain));
             }
         }
         best
@@ -217,6 +274,7 @@ impl Candidates {
     }
 }
 
+/// The points chosen so far, by group; the first of each is its deepest.
 struct Chosen {
     points: [[usize; 4]; 4],
     counts: [usize; 4],

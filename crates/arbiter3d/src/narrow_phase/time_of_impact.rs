@@ -29,17 +29,25 @@ const TOLERANCE: Real = 0.1;
 pub(crate) struct Sweep {
     pub start: Pose,
     pub end: Pose,
+    /// The point of the shape, in its frame, that moves evenly along a straight line while the rest turns about it: its
+    /// middle, however far that is from the origin of the frame.
+    pub pivot: Vec3,
 }
 
 impl Sweep {
     /// A shape that does not move.
     pub(crate) fn still(pose: Pose) -> Self {
-        Self { start: pose, end: pose }
+        Self { start: pose, end: pose, pivot: Vec3::ZERO }
     }
 
-    /// How far the frame moves.
+    /// Where the pivot is at the start.
+    fn from(&self) -> DVec3 {
+        self.start.position.as_dvec3() + self.start.rotation.rotate(self.pivot).as_dvec3()
+    }
+
+    /// How far the pivot moves.
     fn displacement(&self) -> DVec3 {
-        self.end.position.as_dvec3() - self.start.position.as_dvec3()
+        self.end.position.as_dvec3() + self.end.rotation.rotate(self.pivot).as_dvec3() - self.from()
     }
 
     /// Axis of the turn in world space, as long as the largest angular speed (radians per unit of time).
@@ -63,7 +71,7 @@ struct Motion<'a> {
 
 impl<'a> Motion<'a> {
     fn new(sweep1: &'a Sweep, sweep2: &'a Sweep) -> Self {
-        let apart = sweep2.start.position.as_dvec3() - sweep1.start.position.as_dvec3();
+        let apart = sweep2.from() - sweep1.from();
         Self { sweep1, sweep2, apart, displacement: sweep2.displacement() - sweep1.displacement() }
     }
 
@@ -72,8 +80,9 @@ impl<'a> Motion<'a> {
         let (pose1, pose2) =
             (self.sweep1.start.interpolate(&self.sweep1.end, t), self.sweep2.start.interpolate(&self.sweep2.end, t));
         let between = (self.apart + self.displacement * f64::from(t)).as_vec3();
-        let relative =
-            Pose::new(pose1.rotation.inverse_rotate(between), pose1.rotation.conjugate().mul(pose2.rotation));
+        let turned = pose1.rotation.conjugate().mul(pose2.rotation);
+        let pivot1 = pose1.rotation.inverse_rotate(between) + self.sweep1.pivot;
+        let relative = Pose::new(pivot1 - turned.rotate(self.sweep2.pivot), turned);
         (pose1, relative)
     }
 }
@@ -95,7 +104,7 @@ pub(crate) fn time_of_impact(
     let motion = Motion::new(sweep1, sweep2);
     let radii = shape1.radius() + shape2.radius();
     let (spin1, spin2) = (sweep1.spin(), sweep2.spin());
-    let (reach1, reach2) = (shape1.reach(), shape2.reach());
+    let (reach1, reach2) = (shape1.reach(sweep1.pivot), shape2.reach(sweep2.pivot));
     let rounding = 1e-6 * max(reach1, reach2);
     let mut target = target;
     let mut t: Real = 0.0;
@@ -144,7 +153,7 @@ mod tests {
     const SLOP: Real = 0.005;
 
     fn slide(from: Vec3, to: Vec3) -> Sweep {
-        Sweep { start: Pose::from_position(from), end: Pose::from_position(to) }
+        Sweep { start: Pose::from_position(from), end: Pose::from_position(to), pivot: Vec3::ZERO }
     }
 
     fn impact(a: &Shape, sweep: &Sweep, b: &Shape, pose: Pose) -> Option<Real> {
@@ -171,6 +180,31 @@ mod tests {
             let gap = -(start + 3.333 * t) - 0.055;
             assert!((SLOP * 0.99..SLOP * 1.2).contains(&gap), "{k} {gap}");
         }
+    }
+
+    /// A crate as a hull whose points are 40 m from its frame's origin, tumbling, hits when the same crate about its own
+    /// origin does, and as soon.
+    #[test]
+    fn a_hull_far_from_its_frame_hits_like_one_in_the_middle_of_it() {
+        let far = Vec3::new(30.0, 20.0, 17.0);
+        let corners = |at: Vec3| -> Vec<Vec3> {
+            let corner = |i: u8| Vec3::from([i & 1, i >> 1 & 1, i >> 2].map(|b| Real::from(b) - 0.5));
+            (0..8u8).map(|i| corner(i) + at).collect()
+        };
+        let (near, away) = (Shape::hull(&corners(Vec3::ZERO)).unwrap(), Shape::hull(&corners(far)).unwrap());
+        let wall = Shape::cuboid(Vec3::new(0.005, 9.0, 9.0)).unwrap();
+        for k in 0..20 {
+            let turned = Rotation::from_xyzw(0.1 * k as Real, 0.2, 0.3, 1.0).normalize();
+            let (start, end) = (Pose::from_position(Vec3::X * -2.0), Pose::new(Vec3::new(1.0, 0.3, 0.0), turned));
+            let centred = Sweep { start, end, pivot: Vec3::ZERO };
+            let shifted = |pose: Pose| Pose::new(pose.position - pose.rotation.rotate(far), pose.rotation);
+            let offset = Sweep { start: shifted(start), end: shifted(end), pivot: far };
+            let expected = impact(&near, &centred, &wall, Pose::IDENTITY).unwrap();
+            let found = impact(&away, &offset, &wall, Pose::IDENTITY).unwrap();
+            assert!((expected - found).abs() < 1e-3, "{k}: {found}, not {expected}");
+        }
+        let about = |pivot: Vec3| Support::new(&away).unwrap().reach(pivot);
+        assert!(about(far) < 0.87 && about(Vec3::ZERO) > 39.0);
     }
 
     /// The same far from the origin, where a step of `f32` is a millimetre.
@@ -213,8 +247,11 @@ mod tests {
         let rod = Shape::capsule(1.0, 0.01).unwrap();
         let wall = Shape::cuboid(Vec3::new(0.1, 5.0, 5.0)).unwrap();
         let half = libm::sqrtf(0.5);
-        let sweep =
-            Sweep { start: Pose::IDENTITY, end: Pose::new(Vec3::ZERO, Rotation::from_xyzw(0.0, 0.0, -half, half)) };
+        let sweep = Sweep {
+            start: Pose::IDENTITY,
+            end: Pose::new(Vec3::ZERO, Rotation::from_xyzw(0.0, 0.0, -half, half)),
+            pivot: Vec3::ZERO,
+        };
         let t = impact(&rod, &sweep, &wall, Pose::from_position(Vec3::new(0.6, 0.0, 0.0))).unwrap();
         let end = sweep.start.interpolate(&sweep.end, t).rotation.rotate(Vec3::Y);
         let gap = 0.5 - end.x - 0.01;
@@ -233,7 +270,8 @@ mod tests {
                 Rotation::from_xyzw((i * k % 7) as Real - 3.0, (k % 5) as Real, (i + k % 3) as Real, 4.0).normalize()
             };
             let end = Vec3::new(0.02 * k as Real, -1.5, 0.1);
-            let sweep = Sweep { start: Pose::new(Vec3::new(0.0, 1.0, 0.0), q(1)), end: Pose::new(end, q(2)) };
+            let start = Pose::new(Vec3::new(0.0, 1.0, 0.0), q(1));
+            let sweep = Sweep { start, end: Pose::new(end, q(2)), pivot: Vec3::ZERO };
             let t = time_of_impact(&cube, &sweep, &triangle, &Sweep::still(Pose::IDENTITY), SLOP).unwrap();
             let gap = |t: Real| {
                 let pose = sweep.start.interpolate(&sweep.end, t);

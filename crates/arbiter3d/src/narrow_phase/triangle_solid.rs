@@ -24,6 +24,14 @@ const LEVEL_SINE: Real = 0.02;
 /// ones may come from the side (a box past the rim of a finely cut block), so all axes are tried.
 const SHALLOW: Real = 0.5;
 
+/// A face of the solid lies along the triangle, or an edge of the triangle along a face, below this sine (3°): what of it
+/// is farther than that leans out of reach is no longer held.
+const FLAT_SINE: Real = 0.05;
+
+/// Points of a face that lies along the triangle count although another axis overlaps less, unless they are deeper than
+/// the overlap by this share of the scale.
+const EXTRA_DEPTH: Real = 0.25;
+
 /// Axes that push through the triangle to its other side are no way out; those that lean back less tell at least that
 /// the contact is a neighbour's.
 const BACKWARD: Real = -0.7;
@@ -92,20 +100,25 @@ impl Solid for Solids<'_> {
         let pair = Pair { solid: &self.features, triangle, reach, underside: &self.underside, height };
         let shallow = triangle.is_plain() && height >= -SHALLOW * self.features.inner_radius;
         if (shallow || pair.stands_on_face(self.underside.corner)) && !reach.second_look {
-            return pair.touch_face(out) == 0 && height < 0.0;
+            return pair.touch_face(&FacePoints::ALL, out) == 0 && height < 0.0;
         }
         let Some((axis, separation)) = pair.least_overlap() else { return false };
-        let points = match pair.resolve(axis) {
-            Some(Axis::Triangle) => pair.touch_face(out),
+        let resolved = pair.resolve(axis);
+        let points = match resolved {
+            Some(Axis::Triangle) => pair.touch_face(&FacePoints::ALL, out),
             Some(Axis::Face { face }) => pair.touch_solid_face(face, out),
             Some(Axis::Edges { edge, solid_edge, normal }) => pair.touch_edges(edge, solid_edge, normal, out),
-            None if separation < 0.0 && pair.is_hemmed_in(axis, separation) => pair.touch_face(out),
+            None if separation < 0.0 && pair.is_hemmed_in(axis, separation) => pair.touch_face(&FacePoints::ALL, out),
             None => 0,
         };
+        if resolved != Some(Axis::Triangle) && !reach.second_look && pair.lies_flat() {
+            let least = separation - EXTRA_DEPTH * reach.scale;
+            pair.touch_face(&FacePoints { least, rims: points == 0 }, out);
+        }
         if points > 0 || separation >= 0.0 {
             return false;
         }
-        if reach.second_look && pair.touch_face(out) == 0 {
+        if reach.second_look && pair.touch_face(&FacePoints::ALL, out) == 0 {
             pair.touch_overlap(out);
         }
         true
@@ -135,6 +148,18 @@ impl Underside {
         let squared = corners().fold(0.0, |m, corner| max(m, (corner - center).length_squared()));
         Self { normal, corner: lowest.0, face: flattest.0, center, radius: squared.sqrt() }
     }
+}
+
+/// Which points of the solid's lowest face count.
+struct FacePoints {
+    /// Those at least so high over the triangle: deeper ones have a shorter way out.
+    least: Real,
+    /// Also those where a rim cuts the face's edges.
+    rims: bool,
+}
+
+impl FacePoints {
+    const ALL: Self = Self { least: -Real::MAX, rims: true };
 }
 
 /// A solid over a triangle.
@@ -249,10 +274,19 @@ impl Pair<'_> {
         }
     }
 
+    /// Whether the solid's lowest face lies (almost) along the triangle, so that its corners bear although another axis
+    /// overlaps less: without them a solid that rests on a rim, or over a slight bend, would rock from step to step.
+    fn lies_flat(&self) -> bool {
+        let across = self.solid.planes[self.underside.face].normal.cross(self.triangle.normal);
+        across.length_squared() <= FLAT_SINE * FLAT_SINE
+    }
+
     /// The solid's lowest face cut by the prism over the triangle, and the triangle's corners under that face.
-    fn touch_face(&self, out: &mut Candidates) -> usize {
+    fn touch_face(&self, wanted: &FacePoints, out: &mut Candidates) -> usize {
         let triangle = self.triangle;
         let seams = !self.reach.second_look;
+        let left_out =
+            |cut: u32| seams && triangle.is_seam(cut) || !wanted.rims && triangle.edge_is_sharp(cut as usize);
         let mut points = 0;
         let Underside { face, center, radius, .. } = *self.underside;
         if triangle.insides(center).iter().any(|inside| *inside < -radius) {
@@ -275,22 +309,23 @@ impl Pair<'_> {
             end = triangle.insides(b);
             let Some((ends, cuts)) = Triangle::clip(&start, &end) else { continue };
             if cuts[0] == 3 {
-                points += self.face_point(a, u32::from(self.solid.edges[edge].origin), out);
+                points += self.face_point(a, wanted.least, u32::from(self.solid.edges[edge].origin), out);
             }
             for k in 0..2 {
                 // Where a seam cuts is no end of the contact.
-                if cuts[k] != 3 && !(seams && triangle.is_seam(cuts[k])) {
-                    points += self.face_point(a + (b - a) * ends[k], self.cut(edge, cuts[k], k as u32), out);
+                if cuts[k] != 3 && !left_out(cuts[k]) {
+                    let feature = self.cut(edge, cuts[k], k as u32);
+                    points += self.face_point(a + (b - a) * ends[k], wanted.least, feature, out);
                 }
             }
         }
         let plane = self.solid.planes[face];
         let slope = plane.normal.dot(triangle.normal);
         for (i, corner) in triangle.corners.iter().enumerate() {
-            if under[i] && slope < -0.01 {
+            if under[i] && slope < -0.01 && wanted.rims {
                 let gap = (plane.offset - plane.normal.dot(*corner)) / slope;
                 let feature = 512 + (triangle.facet.id << 2 | i as u32);
-                points += self.face_point(*corner + triangle.normal * gap, feature, out);
+                points += self.face_point(*corner + triangle.normal * gap, wanted.least, feature, out);
             }
         }
         points
@@ -302,9 +337,9 @@ impl Pair<'_> {
     }
 
     /// A point of the solid over (or under) the triangle.
-    fn face_point(&self, point: Vec3, feature: u32, out: &mut Candidates) -> usize {
+    fn face_point(&self, point: Vec3, least: Real, feature: u32, out: &mut Candidates) -> usize {
         let height = self.triangle.height(point);
-        if height > self.reach.margin {
+        if height > self.reach.margin || height < least {
             return 0;
         }
         out.push(self.triangle.face_candidate(point, height, 0.0, feature));
@@ -359,12 +394,57 @@ impl Pair<'_> {
             }
             return 2;
         }
+        let points = self.touch_lying_edge(edge, solid_edge, normal, out);
+        if points > 0 {
+            return points;
+        }
         let (d1, d2, r) = (first.1 - first.0, second.1 - second.0, first.0 - second.0);
         let (a, e, b) = (d1.length_squared(), d2.length_squared(), d1.dot(d2));
         let t = clamp((b * d2.dot(r) - d1.dot(r) * e) / (a * e - b * b), 0.0, 1.0);
         let separation = normal.dot(second.0 - first.0);
         out.push(self.triangle.rim_candidate(first.0 + d1 * t, normal, separation, feature));
         1
+    }
+
+    /// An edge of the triangle that lies (almost) along a face beside the solid's edge bears at both ends of the stretch
+    /// under that face, not only where the two edges cross.
+    fn touch_lying_edge(&self, edge: usize, solid_edge: usize, normal: Vec3, out: &mut Candidates) -> usize {
+        let (a, b) = self.triangle.edge(edge);
+        let along = b - a;
+        let faces = [solid_edge, solid_edge ^ 1].map(|e| self.solid.edges[e].face as usize);
+        let slopes = faces.map(|face| self.solid.planes[face].normal.dot(along).abs());
+        let (face, slope) = if slopes[0] <= slopes[1] { (faces[0], slopes[0]) } else { (faces[1], slopes[1]) };
+        let plane = self.solid.planes[face];
+        let facing = -plane.normal.dot(normal);
+        if slope * slope > FLAT_SINE * FLAT_SINE * along.length_squared() || facing < 0.5 {
+            return 0;
+        }
+        let mut ends = [0.0, 1.0];
+        for side_edge in self.solid.face_loop(face) {
+            let (side, offset) = self.solid.side_plane(side_edge, plane.normal);
+            let (da, db) = (offset - side.dot(a), offset - side.dot(b));
+            if da < 0.0 && db < 0.0 {
+                return 0;
+            } else if da < 0.0 {
+                ends[0] = max(ends[0], da / (da - db));
+            } else if db < 0.0 {
+                ends[1] = min(ends[1], da / (da - db));
+            }
+        }
+        if ends[0] >= ends[1] {
+            return 0;
+        }
+        let mut points = 0;
+        for (k, t) in ends.into_iter().enumerate() {
+            let position = a + along * t;
+            let separation = (plane.normal.dot(position) - plane.offset) / facing;
+            if separation <= self.reach.margin {
+                let feature = 2048 + ((face as u32) << 3 | (edge as u32) << 1 | k as u32);
+                out.push(self.triangle.rim_candidate(position, normal, separation, feature));
+                points += 1;
+            }
+        }
+        points
     }
 
     /// The part of the triangle inside the solid, pushed out along the face normal: never nothing for a real overlap.

@@ -136,9 +136,10 @@ impl<'a> Mover<'a> {
             Shape::Hull(hull) => (Support::Sphere(Sphere::new(thickness).ok()?), hull.centroid()),
             Shape::Mesh(_) => return None,
         };
-        let path = Sweep { start: start.mul(on_body), end: end.mul(on_body) };
+        // A hull's frame may be far from the hull (a part of a tree is given about the tree's foot): it turns about its middle.
+        let path = Sweep { start: start.mul(on_body), end: end.mul(on_body), pivot: center };
         let to_middle = Pose::from_position(center);
-        let core_path = Sweep { start: path.start.mul(&to_middle), end: path.end.mul(&to_middle) };
+        let core_path = Sweep { start: path.start.mul(&to_middle), end: path.end.mul(&to_middle), pivot: Vec3::ZERO };
         let middle = Support::Sphere(Sphere::new(0.1 * thickness).ok()?);
         Some(Self { shape, support: Support::new(&shape.geometry)?, path, core, middle, core_path })
     }
@@ -148,13 +149,17 @@ impl<'a> Mover<'a> {
     fn swept_aabb(&self) -> Aabb {
         let geometry = &self.shape.geometry;
         let (start, end) = (&self.path.start, &self.path.end);
-        let bulge = self.support.reach() * max(1.0 - start.rotation.dot(end.rotation).abs(), 0.0);
+        let bulge = self.support.reach(self.path.pivot) * max(1.0 - start.rotation.dot(end.rotation).abs(), 0.0);
         geometry.aabb(start).union(&geometry.aabb(end)).expand(bulge)
     }
 
     /// The same seen from a frame at rest.
     fn relative_to(&self, frame: &Pose) -> Self {
-        let seen = |path: &Sweep| Sweep { start: frame.relative(&path.start), end: frame.relative(&path.end) };
+        let seen = |path: &Sweep| Sweep {
+            start: frame.relative(&path.start),
+            end: frame.relative(&path.end),
+            pivot: path.pivot,
+        };
         Self { path: seen(&self.path), core_path: seen(&self.core_path), ..*self }
     }
 }
