@@ -116,7 +116,8 @@ class Player {
   }
 
   tick(now) {
-    const seconds = Math.min((now - this.last) / 1000, 0.2);
+    // The first tick may be stamped before the page was ready.
+    const seconds = Math.min(Math.max((now - this.last) / 1000, 0), 0.2);
     this.last = now;
     if (this.playing) {
       this.keepPace(seconds);

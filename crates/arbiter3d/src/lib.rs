@@ -24,6 +24,10 @@
 
 mod arbiter;
 mod broad_phase;
+mod error;
+#[cfg(doctest)]
+mod guide;
+mod id;
 mod island;
 pub mod math;
 pub mod narrow_phase;

@@ -42,7 +42,8 @@ fn a_rebound_reaches_e_squared_h() {
                     let top = rebound(&shape, height, restitution, rate);
                     let expected = restitution * restitution * height;
                     let error = if restitution > 0.0 { top / expected - 1.0 } else { top / height };
-                    let line = format!("{name} h {height} e {restitution} at {rate} Hz: {top} ({:+.2} %)", error * 100.0);
+                    let line =
+                        format!("{name} h {height} e {restitution} at {rate} Hz: {top} ({:+.2} %)", error * 100.0);
                     if error.abs() > 0.02 {
                         failures.push(line);
                     }
@@ -104,7 +105,8 @@ fn a_bouncing_ball_comes_to_rest() {
 /// Restitutions are combined by rule, the larger by default.
 #[test]
 fn restitutions_are_combined_by_rule() {
-    for (rule, expected) in [(CombineRule::Maximum, 0.8_f32), (CombineRule::Average, 0.4), (CombineRule::Minimum, 0.0)] {
+    for (rule, expected) in [(CombineRule::Maximum, 0.8_f32), (CombineRule::Average, 0.4), (CombineRule::Minimum, 0.0)]
+    {
         let mut world = weightless();
         floor(&mut world, 0.0);
         let material = Material { restitution: 0.8, restitution_combine: rule, ..Material::default() };

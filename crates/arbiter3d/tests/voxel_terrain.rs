@@ -5,7 +5,9 @@ mod terrain;
 
 use arbiter3d::math::Vec3;
 use arbiter3d::*;
-use terrain::{DT, Ground, Terrain, Voxel, rain};
+use terrain::{Ground, Terrain, Voxel, rain};
+
+const DT: f32 = 1.0 / 60.0;
 
 /// The rain after it has come to rest, and how many steps that took.
 fn settled(threads: usize) -> (World, Ground, Vec<BodyId>, usize) {

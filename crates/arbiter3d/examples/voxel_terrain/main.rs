@@ -1,12 +1,15 @@
 //! Bodies on a terrain of 64 × 64 × 32 voxels that the engine knows nothing of: a first collision system of one's own.
 //!
-//! All of it is in `terrain.rs`: some 60 lines find the contacts. Run with
+//! All of it is in `terrain.rs`; finding the contacts takes some 80 lines. Run with
 //! `cargo run --release -p arbiter3d --example voxel_terrain`.
 
 mod terrain;
 
 use arbiter3d::{Error, World};
-use terrain::{DT, Ground, Terrain, rain};
+use terrain::{Ground, Terrain, rain};
+
+/// Seconds a step.
+const DT: f32 = 1.0 / 60.0;
 
 fn main() -> Result<(), Error> {
     let mut world = World::default();

@@ -13,8 +13,6 @@ use arbiter3d::narrow_phase::{Manifold, PairCache, collide};
 use arbiter3d::*;
 use std::sync::{Arc, PoisonError, RwLock, RwLockReadGuard, RwLockWriteGuard};
 
-/// Seconds a step.
-pub const DT: f32 = 1.0 / 60.0;
 /// Voxels along x and z; each is a cube of one metre.
 const WIDTH: i32 = 64;
 /// Voxels along y, as many as a `u32` has bits.
@@ -180,9 +178,10 @@ impl ContactProvider for VoxelCollision {
     fn provide(&mut self, context: &mut StepContext<'_>) {
         let ground = self.ground.clone();
         let terrain = ground.terrain();
+        let dt = context.dt();
         for body in context.awake_bodies().filter_map(|id| context.body(id)) {
             for shape in body.shapes().iter().filter_map(|&id| context.shape(id)) {
-                self.find(&terrain, &body, &shape);
+                self.find(&terrain, &Mover { body, shape, dt });
             }
         }
         for (key, body, contact) in self.found.drain(..) {
@@ -192,17 +191,36 @@ impl ContactProvider for VoxelCollision {
     }
 }
 
+/// A shape on a body that is awake.
+struct Mover<'a> {
+    body: BodyRef<'a>,
+    shape: ShapeRef<'a>,
+    /// Seconds of the step.
+    dt: f32,
+}
+
+impl Mover<'_> {
+    /// How far off a voxel may be to be touched in this step, metres.
+    fn reach(&self) -> f32 {
+        MARGIN + self.body.linear_velocity().length() * self.dt
+    }
+
+    /// How much nearer a point of the body comes in this step to a surface with this normal, metres.
+    fn closing(&self, point: Vec3, normal: Vec3) -> f32 {
+        (-self.body.velocity_at(point).dot(normal) * self.dt).max(0.0)
+    }
+}
+
 impl VoxelCollision {
-    /// Gathers the contacts of one shape with all voxels that it can reach in this step.
-    fn find(&mut self, terrain: &Terrain, body: &BodyRef<'_>, shape: &ShapeRef<'_>) {
-        let reach = MARGIN + body.linear_velocity().length() * DT;
-        let near = shape.aabb().expand(reach);
+    /// Gathers the contacts of one shape with all voxels that it can reach.
+    fn find(&mut self, terrain: &Terrain, mover: &Mover<'_>) {
+        let near = mover.shape.aabb().expand(mover.reach());
         let (low, high) = (near.min.floor().as_ivec3(), near.max.floor().as_ivec3());
         for y in low.y..=high.y {
             for z in low.z..=high.z {
                 for x in low.x..=high.x {
                     if terrain.is_solid([x, y, z]) {
-                        self.touch(terrain, [x, y, z], body, shape);
+                        self.touch(terrain, [x, y, z], mover);
                     }
                 }
             }
@@ -210,22 +228,20 @@ impl VoxelCollision {
     }
 
     /// Gathers the contacts of one shape with one voxel.
-    fn touch(&mut self, terrain: &Terrain, voxel: Voxel, body: &BodyRef<'_>, shape: &ShapeRef<'_>) {
+    fn touch(&mut self, terrain: &Terrain, voxel: Voxel, mover: &Mover<'_>) {
         let Some(key1) = self.ground.key1(voxel) else { return };
-        let center = Vec3::new(voxel[0] as f32, voxel[1] as f32, voxel[2] as f32) + Vec3::splat(0.5);
-        let seen_from_voxel = Pose::from_position(center).relative(&shape.world_pose());
-        let reach = MARGIN + body.linear_velocity().length() * DT;
+        let key = ArbiterKey::new(key1, mover.shape.id().raw());
+        let center = Vec3::from_array(voxel.map(|i| i as f32 + 0.5));
+        let pose = Pose::from_position(center).relative(&mover.shape.world_pose());
         let mut manifold = Manifold::EMPTY;
         let cache = &mut PairCache::default();
-        collide(&self.cube, shape.geometry(), &seen_from_voxel, reach, cache, &mut manifold);
+        collide(&self.cube, mover.shape.geometry(), &pose, mover.reach(), cache, &mut manifold);
         for point in manifold.points() {
             let Some(normal) = terrain.open_normal(voxel, point.normal) else { continue };
             let (on_voxel, on_shape) = (center + point.point1, center + point.point2());
-            // What is still apart counts only if it closes in on the voxel fast enough to touch within this step.
-            let closing = -body.velocity_at(on_shape).dot(normal) * DT;
-            if (on_shape - on_voxel).dot(normal) <= MARGIN + closing.max(0.0) {
-                let key = ArbiterKey::new(key1, shape.id().raw());
-                self.found.push((key, body.id(), ContactPoint::new(on_voxel, on_shape, normal)));
+            // What is still apart counts only if it comes near enough within this step.
+            if (on_shape - on_voxel).dot(normal) <= MARGIN + mover.closing(on_shape, normal) {
+                self.found.push((key, mover.body.id(), ContactPoint::new(on_voxel, on_shape, normal)));
             }
         }
     }
@@ -241,12 +257,9 @@ pub fn rain(world: &mut World, ground: &Ground) -> Result<Vec<BodyId>, Error> {
         let y = ground.terrain().ground(x as i32, z as i32) as f32 + 1.5 + 1.5 * (i / 100) as f32;
         let axis = Vec3::new(random(i, 2, 7) - 0.5, random(i, 3, 7) - 0.5, random(i, 4, 7) - 0.5);
         let tumbled = Rotation::from_xyzw(axis.x, axis.y, axis.z, 0.5).normalize();
-        let body = BodyDefinition::dynamic().at(Vec3::new(x, y, z)).rotated(tumbled.to_quat());
-        let body = world.add_body(&body)?;
-        world.add_shape(
-            body,
-            &ShapeDefinition::new(kinds[i as usize % 3].clone()).friction(0.6).rolling_resistance(0.05),
-        )?;
+        let body = world.add_body(&BodyDefinition::dynamic().at(Vec3::new(x, y, z)).rotated(tumbled.to_quat()))?;
+        let shape = ShapeDefinition::new(kinds[i as usize % 3].clone());
+        world.add_shape(body, &shape.friction(0.6).rolling_resistance(0.05))?;
         bodies.push(body);
     }
     Ok(bodies)

@@ -5,8 +5,8 @@
 //! read off at any time without asking the shapes.
 
 use super::SolveMode;
+use crate::error::{self, Error};
 use crate::math::{Real, Vec3};
-use crate::world::{Error, error};
 
 /// Slots of an arbiter.
 pub(crate) const SLOTS: usize = 4;

@@ -1,6 +1,6 @@
 //! How arbiters are told apart.
 
-use crate::world::ShapeId;
+use crate::id::ShapeId;
 
 /// An ordered pair of numbers that names an arbiter: `(1, 2)` and `(2, 1)` are different keys.
 ///

@@ -7,7 +7,7 @@
 
 use super::contact_data::ContactData;
 use super::key::ArbiterKey;
-use crate::world::BodyId;
+use crate::id::BodyId;
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 

@@ -70,7 +70,12 @@ pub(crate) fn integrate_velocity(
 /// A vector no longer than `longest`.
 fn limit(v: Vec3, longest: Real) -> Vec3 {
     let squared = v.length_squared();
-    if squared > longest * longest { v * (longest / squared.sqrt()) } else { v }
+    if squared <= longest * longest {
+        return v;
+    }
+    // Scaled first, since the square of a finite length may be infinite.
+    let scaled = v / v.abs().max_element();
+    if v.is_finite() { scaled * (longest / scaled.length()) } else { v }
 }
 
 /// Positions at the end of a substep.

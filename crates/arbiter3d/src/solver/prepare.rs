@@ -59,7 +59,7 @@ pub(crate) fn prepare_row<const L: usize, const P: usize, const C: usize>(
     let separations = prepare_normals(row, &gathered);
     prepare_friction(row, friction, &gathered, &separations, context.speculative_distance);
     for (lane, source) in sources.iter().enumerate().take(L) {
-        warm_friction(row, friction, lane, source, context);
+        warm_friction(friction, lane, source, context);
     }
     if friction.has_restitution {
         prepare_restitution(row, friction, context.bodies);
@@ -252,8 +252,7 @@ fn wide_tangents<const L: usize>(n: &WideVec3<L>) -> (WideVec3<L>, WideVec3<L>) 
 
 /// The friction impulses of the last step, turned into this step's tangents, and the surface velocity.
 #[inline(always)]
-fn warm_friction<const L: usize, const P: usize, const C: usize>(
-    row: &NormalRow<L, P, C>,
+fn warm_friction<const L: usize, const P: usize>(
     friction: &mut FrictionRow<L, P>,
     lane: usize,
     source: &RowSource,
@@ -274,7 +273,6 @@ fn warm_friction<const L: usize, const P: usize, const C: usize>(
     friction.twist_impulse[lane] = if P == 1 { 0.0 } else { twist };
     friction.target1[lane] = data.tangent_velocity.dot(t1);
     friction.target2[lane] = data.tangent_velocity.dot(t2);
-    let _ = row;
 }
 
 /// Normal velocities with which the points would hit.

@@ -19,7 +19,7 @@
 //! centre of its points: two tangents limited by a circular cone, a twist about the normal limited by the levers of the
 //! points.
 
-use super::bodies::{SharedStates, WideVelocity, gather, scatter};
+use super::bodies::{SharedStates, WideDisplacement, WideVelocity, gather, scatter};
 use super::rows::{FrictionRow, NormalRow};
 use crate::math::Real;
 use crate::simd::{Wide, WideVec3};
@@ -51,6 +51,8 @@ impl Softness {
 pub(crate) struct PassParameters {
     pub inverse_substep: Real,
     pub push_out_speed: Real,
+    /// Overlap past which a contact at rest gives no further, m: its spring is as much stiffer as its load asks for.
+    pub deepest_rest: Real,
     pub softness: Softness,
     pub restitution_threshold: Real,
 }
@@ -97,11 +99,7 @@ pub(crate) unsafe fn solve<const L: usize, const P: usize, const C: usize>(
     let (mut v1, d1) = unsafe { gather(states, &row.body1) };
     // SAFETY: promised by the caller.
     let (mut v2, d2) = unsafe { gather(states, &row.body2) };
-    let approach = row.normal.dot(&(d2.translation - d1.translation));
-    let separations: [Wide<L>; P] = std::array::from_fn(|i| {
-        let point = &row.points[i];
-        point.separation + approach + point.arm2.dot(&d2.turn) - point.arm1.dot(&d1.turn)
-    });
+    let separations = separations(row, &d1, &d2);
     solve_normals::<L, P, C, true>(row, &separations, &mut v1, &mut v2, pass);
     // SAFETY: promised by the caller.
     unsafe { scatter(states, &row.body1, &v1) };
@@ -124,11 +122,7 @@ pub(crate) unsafe fn relax<const L: usize, const P: usize, const C: usize>(
     let (mut v1, d1) = unsafe { gather(states, &row.body1) };
     // SAFETY: promised by the caller.
     let (mut v2, d2) = unsafe { gather(states, &row.body2) };
-    let approach = row.normal.dot(&(d2.translation - d1.translation));
-    let separations: [Wide<L>; P] = std::array::from_fn(|i| {
-        let point = &row.points[i];
-        point.separation + approach + point.arm2.dot(&d2.turn) - point.arm1.dot(&d1.turn)
-    });
+    let separations = separations(row, &d1, &d2);
     solve_normals::<L, P, C, false>(row, &separations, &mut v1, &mut v2, pass);
     let mut load = Wide::ZERO;
     let mut twist_load = Wide::ZERO;
@@ -184,9 +178,9 @@ pub(crate) unsafe fn restitute<const L: usize, const P: usize, const C: usize>(
             let delta = new - old;
             row.impulses[i] = new;
             friction.totals[i] += delta;
-            for j in 0..P {
+            for (j, velocity) in velocities.iter_mut().enumerate() {
                 let response = if i == j { own[i] } else { row.coupling[pair_of::<P>(i.min(j), i.max(j))] };
-                velocities[j] += response * delta;
+                *velocity += response * delta;
             }
             sum.add_point(row, i, delta);
         }
@@ -205,6 +199,20 @@ const RESTITUTION_SWEEPS: usize = 8;
 #[inline(always)]
 const fn pair_of<const P: usize>(i: usize, j: usize) -> usize {
     i * P - i * (i + 1) / 2 + j - i - 1
+}
+
+/// Gap at each point now, to first order in the displacements of the step.
+#[inline(always)]
+fn separations<const L: usize, const P: usize, const C: usize>(
+    row: &NormalRow<L, P, C>,
+    d1: &WideDisplacement<L>,
+    d2: &WideDisplacement<L>,
+) -> [Wide<L>; P] {
+    let approach = row.normal.dot(&(d2.translation - d1.translation));
+    std::array::from_fn(|i| {
+        let point = &row.points[i];
+        point.separation + approach + point.arm2.dot(&d2.turn) - point.arm1.dot(&d1.turn)
+    })
 }
 
 /// Normal velocity at each point.
@@ -233,6 +241,7 @@ fn solve_normals<const L: usize, const P: usize, const C: usize, const BIAS: boo
     let (soft, one) = (Wide::splat(pass.softness.mass_scale), Wide::splat(1.0));
     let leak = Wide::splat(pass.softness.impulse_scale);
     let limit = Wide::splat(-pass.push_out_speed);
+    let firmest = rate * Wide::splat(pass.deepest_rest);
     let mut sum = Impulse::ZERO;
     let mut pair = 0;
     for i in 0..P {
@@ -245,7 +254,7 @@ fn solve_normals<const L: usize, const P: usize, const C: usize, const BIAS: boo
         };
         let old = row.impulses[i];
         let change = if BIAS {
-            row.points[i].mass * (scale * velocities[i] + bias) + leak * old
+            row.points[i].mass * (scale * velocities[i] + bias) + (leak * old).min(row.points[i].mass * firmest)
         } else {
             row.points[i].mass * (velocities[i] + bias)
         };

@@ -2,14 +2,14 @@
 
 use super::World;
 use super::definition::Material;
-use super::error::{Error, finite_vec, unit_vec};
 use super::events::EndEvent;
-use super::id::BodyId;
 use crate::arbiter::{
     Arbiter, ArbiterId, ArbiterKey, Contact, ContactPoint, EndReason, FRICTION_OVERRIDDEN, NONE,
     RESTITUTION_OVERRIDDEN, ROLLING_OVERRIDDEN, SolveMode, TANGENT_VELOCITY_OVERRIDDEN,
 };
-use crate::math::{Real, Vec3, max};
+use crate::error::{Error, finite_vec, unit_vec};
+use crate::id::BodyId;
+use crate::math::{Real, Rotation, Vec3, max};
 use crate::shape::Shape;
 use std::ops::Range;
 
@@ -220,8 +220,10 @@ impl World {
         let restitution = ma.restitution_combine.max(mb.restitution_combine).combine(ma.restitution, mb.restitution);
         let rolling = max(ma.rolling_resistance, mb.rolling_resistance)
             * rolling_radius([&a.geometry, &b.geometry], [ma, mb].map(|m| m.rolling_resistance));
-        let velocity = |side: usize, local: Vec3| self.bodies[pair.bodies[side] as usize].pose.rotation.rotate(local);
-        let tangent = velocity(0, ma.tangent_velocity) - velocity(1, mb.tangent_velocity);
+        let tangent = surface_velocity([ma, mb], pair.bodies.map(|body| self.bodies[body as usize].pose.rotation));
+        let conveyor = [ma, mb].iter().any(|material| material.tangent_velocity != Vec3::ZERO);
+        let pair = self.arbiters.at(index).pair;
+        self.pairs[pair as usize].conveyor = conveyor;
         let data = &mut self.arbiters.at_mut(index).data;
         let keeps = |flag: u8| data.flags & flag != 0;
         let (f, r, t, o) = (
@@ -282,6 +284,12 @@ impl World {
             }
         }
     }
+}
+
+/// Velocity of the surface of body 1 against that of body 2, world axes.
+pub(crate) fn surface_velocity(materials: [&Material; 2], rotations: [Rotation; 2]) -> Vec3 {
+    let [a, b] = [0, 1].map(|side| rotations[side].rotate(materials[side].tangent_velocity));
+    a - b
 }
 
 /// Radius that rolls: that of the round shape, or for polyhedra with a resistance of their own a quarter of the inner radius.

@@ -2,10 +2,10 @@
 
 use super::World;
 use super::definition::{BodyKind, LockedAxes, validate_mass};
-use super::error::{Error, finite, finite_vec, in_range, unit_rotation};
 use super::events::{BeginListener, EndListener};
-use super::id::{BodyId, ShapeId};
 use crate::arbiter::{EndReason, NONE};
+use crate::error::{Error, finite, finite_vec, in_range, unit_rotation};
+use crate::id::{BodyId, ShapeId};
 use crate::math::{Mat3, Pose, Quat, Real, SymmetricMat3, Vec3};
 use crate::shape::MassProperties;
 use crate::solver::BodyMotion;

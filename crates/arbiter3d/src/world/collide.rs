@@ -10,12 +10,15 @@
 //! Pairs are independent: they run on all threads, each writing its own arbiter. What begins is gathered and sorted by key.
 
 use super::World;
+use super::arbiters::surface_velocity;
 use super::bodies::Body;
 use super::filters::UserFilters;
 use super::pairs::Pair;
 use super::settings::WorldSettings;
 use super::shapes::ShapeSlot;
-use crate::arbiter::{Arbiter, ArbiterKey, Contact, ContactData, EndReason, NONE, ONE_NORMAL, SLOTS};
+use crate::arbiter::{
+    Arbiter, ArbiterKey, Contact, ContactData, EndReason, NONE, ONE_NORMAL, SLOTS, TANGENT_VELOCITY_OVERRIDDEN,
+};
 use crate::math::{Pose, Real, Rotation, Vec3, max, min};
 use crate::narrow_phase::{Manifold, collide};
 use crate::parallel::{Gather, SharedSlice};
@@ -164,12 +167,15 @@ impl World {
 }
 
 impl CollideContext<'_> {
-    fn collide_pair(&self, index: u32, pair: &mut Pair, arbiter: Option<&mut Arbiter>) -> Option<News> {
+    fn collide_pair(&self, index: u32, pair: &mut Pair, mut arbiter: Option<&mut Arbiter>) -> Option<News> {
         if pair.shapes.iter().any(|&slot| self.moved[slot as usize]) && !self.boxes_overlap(pair) {
             return Some(News::Apart(index));
         }
         let [center1, center2] = pair.bodies.map(|body| self.solver.masses[body as usize].pose());
         let between = center1.relative(&center2);
+        if let Some(arbiter) = arbiter.as_mut().filter(|_| pair.conveyor) {
+            self.turn_conveyor(pair, &mut arbiter.data);
+        }
         if pair.has_manifold && self.may_reuse(pair, &between) {
             if let Some(arbiter) = arbiter.filter(|_| !pair.hardly_turned(center1.rotation)) {
                 pair.manifold_rotation = center1.rotation;
@@ -179,6 +185,15 @@ impl CollideContext<'_> {
         }
         pair.manifold_rotation = center1.rotation;
         self.collide_anew(index, pair, &between, arbiter)
+    }
+
+    /// Surface velocities turn with their bodies.
+    fn turn_conveyor(&self, pair: &Pair, data: &mut ContactData) {
+        if data.flags & TANGENT_VELOCITY_OVERRIDDEN == 0 {
+            let materials = pair.shapes.map(|slot| &self.shapes[slot as usize].material);
+            let rotations = pair.bodies.map(|body| self.solver.masses[body as usize].rotation);
+            data.tangent_velocity = surface_velocity(materials, rotations);
+        }
     }
 
     /// Whether last time's manifold still holds, or last time's lack of one.

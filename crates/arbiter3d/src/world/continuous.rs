@@ -100,6 +100,9 @@ impl World {
         let pushed_in = gap(fixed, &mover.core, &mover.core_path.start) <= 0.0;
         let inside = if pushed_in { &mover.middle } else { &mover.core };
         let core = time_of_impact(fixed, &still, inside, &mover.core_path, slop)?;
+        if pushed_in && gap(fixed, inside, &mover.core_path.start) <= inside.radius() {
+            return Some(0.0); // no nearer: half the gap in each step is nothing in the end
+        }
         if gap(fixed, &mover.support, &mover.path.start) <= self.scaled.speculative_distance {
             return Some(core);
         }

@@ -1,6 +1,6 @@
 //! How bodies and shapes are asked for.
 
-use super::error::{Error, finite, finite_vec, in_range, unit_rotation};
+use crate::error::{Error, finite, finite_vec, in_range, unit_rotation};
 use crate::math::{Quat, Real, Vec3};
 use crate::shape::{MassProperties, Shape};
 

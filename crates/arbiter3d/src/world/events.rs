@@ -9,11 +9,11 @@
 
 use super::World;
 use super::bodies::BodyRef;
-use super::error::Error;
-use super::id::{BodyId, ShapeId};
 use super::shapes::ShapeRef;
 use crate::arbiter::{Arbiter, ArbiterId, ArbiterKey, ContactData, ContactPoint, EndReason, IdMap};
-use crate::math::Aabb;
+use crate::error::Error;
+use crate::id::{BodyId, ShapeId};
+use crate::math::{Aabb, Real};
 
 /// An arbiter has begun.
 ///
@@ -156,6 +156,12 @@ impl<'a> StepContext<'a> {
     #[must_use]
     pub fn world(&self) -> &World {
         self.world
+    }
+
+    /// Seconds of the step under way; of the last one for what is raised between two steps.
+    #[must_use]
+    pub fn dt(&self) -> Real {
+        self.world.dt
     }
 
     /// A body, to read.

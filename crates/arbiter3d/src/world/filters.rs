@@ -1,9 +1,9 @@
 //! Filters of the user's own: which pairs are looked at, and which manifolds count.
 
 use super::World;
-use super::id::{BodyId, ShapeId};
 use super::pairs::Pair;
 use crate::arbiter::EndReason;
+use crate::id::{BodyId, ShapeId};
 use crate::narrow_phase::Manifold;
 
 /// Two shapes that may collide; shape 1 has the smaller id.

@@ -5,10 +5,8 @@ mod bodies;
 mod collide;
 mod continuous;
 mod definition;
-pub(crate) mod error;
 mod events;
 mod filters;
-mod id;
 mod numbers;
 mod pairs;
 mod queries;
@@ -19,12 +17,12 @@ mod step;
 mod timings;
 mod validate;
 
+pub use crate::error::{Error, UNIT_TOLERANCE};
+pub use crate::id::{BodyId, ShapeId};
 pub use bodies::{BodyMut, BodyRef};
 pub use definition::{BodyDefinition, BodyKind, CombineRule, Filter, LockedAxes, Material, ShapeDefinition};
-pub use error::{Error, UNIT_TOLERANCE};
 pub use events::{BeginEvent, BeginListener, ContactProvider, EndEvent, EndListener, SensorEvent, StepContext};
 pub use filters::{ContactFilter, PairFilter, ShapePair};
-pub use id::{BodyId, ShapeId};
 pub use queries::{QueryFilter, RayHit};
 pub use settings::WorldSettings;
 pub use shapes::{ShapeMut, ShapeRef};
@@ -33,13 +31,13 @@ pub use timings::{Phase, Timings};
 
 use crate::arbiter::{ArbiterStore, EndReason, IdMap, NONE};
 use crate::broad_phase::{BroadPhase, PairSet};
+use crate::error::unit_rotation;
 use crate::island::{IslandFinder, SleepingIslands};
-use crate::math::Pose;
+use crate::math::{Pose, Real};
 use crate::parallel::StagePool;
 use crate::simd::SimdLevel;
 use crate::solver::{ContactSolver, RowPlan, SolverBodies, contact_solver};
 use bodies::Body;
-use error::unit_rotation;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Everything that steps together: bodies, their shapes, and the arbiters between them.
@@ -66,6 +64,8 @@ pub struct World {
     /// Where generations start, so that ids of one world are unlikely to be taken for another's.
     tag: u32,
     next_id: u64,
+    /// Seconds of the last step.
+    dt: Real,
     bodies: Vec<Body>,
     free_bodies: Vec<u32>,
     solver_bodies: SolverBodies,
@@ -138,6 +138,7 @@ impl World {
             scaled: settings.scaled(),
             tag,
             next_id: 1,
+            dt: 0.0,
             bodies: vec![Body::new(0)],
             free_bodies: Vec::new(),
             solver_bodies: SolverBodies::default(),

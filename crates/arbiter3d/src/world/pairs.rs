@@ -7,7 +7,7 @@
 use super::World;
 use super::definition::BodyKind;
 use crate::arbiter::{EndReason, NONE};
-use crate::math::{Pose, Real, Rotation, max, min};
+use crate::math::{Pose, Real, Rotation, Vec3, max, min};
 use crate::narrow_phase::PairCache;
 
 /// What the world keeps of a pair. Shape 1 has the smaller id.
@@ -21,6 +21,8 @@ pub(crate) struct Pair {
     pub active_place: u32,
     pub alive: bool,
     pub sensor: bool,
+    /// Whether a surface of the two moves along itself: its direction turns with its body.
+    pub conveyor: bool,
     /// For sensors: whether the shapes overlap.
     pub overlapping: bool,
     /// Whether `manifold_pose` holds: cleared by teleports and edits.
@@ -110,6 +112,7 @@ impl World {
             active_place: NONE,
             alive: true,
             sensor: shapes.iter().any(|&slot| self.shapes[slot as usize].sensor),
+            conveyor: shapes.iter().any(|&slot| self.shapes[slot as usize].material.tangent_velocity != Vec3::ZERO),
             overlapping: false,
             has_manifold: false,
             manifold_pose: Pose::IDENTITY,

@@ -1,9 +1,9 @@
 //! Questions to the world: rays and boxes.
 
 use super::World;
-use super::error::{Error, finite_vec};
-use super::id::{BodyId, ShapeId};
 use super::shapes::ShapeSlot;
+use crate::error::{Error, finite_vec};
+use crate::id::{BodyId, ShapeId};
 use crate::math::{Aabb, Real, Vec3};
 use crate::query::{Ray, ShapeHit, cast_ray};
 use crate::shape::Shape;
@@ -165,6 +165,6 @@ fn cast_shape(shape: &ShapeSlot, ray: &Ray) -> Option<(ShapeHit, Option<u32>)> {
 fn checked_ray(origin: Vec3, direction: Vec3, max_fraction: Real) -> Result<Ray, Error> {
     finite_vec("ray origin", origin)?;
     finite_vec("ray direction", direction)?;
-    super::error::in_range("max_fraction", max_fraction, 0.0, Real::INFINITY)?;
+    crate::error::in_range("max_fraction", max_fraction, 0.0, Real::INFINITY)?;
     Ok(Ray { origin, direction, max_fraction })
 }

@@ -1,6 +1,6 @@
 //! Every constant of the step in one place.
 
-use super::error::{Error, finite_vec, in_range};
+use crate::error::{Error, finite_vec, in_range};
 use crate::math::{Real, Vec3};
 use crate::simd::SimdLevel;
 

@@ -2,10 +2,10 @@
 
 use super::World;
 use super::definition::{BodyKind, Filter, Material, ShapeDefinition};
-use super::error::{Error, unit_rotation};
-use super::id::{BodyId, ShapeId};
 use crate::arbiter::{EndReason, NONE};
 use crate::broad_phase::TreeKind;
+use crate::error::{Error, unit_rotation};
+use crate::id::{BodyId, ShapeId};
 use crate::math::{Aabb, Pose, Quat, Real, Vec3};
 use crate::shape::Shape;
 
@@ -184,7 +184,7 @@ impl<'a> ShapeMut<'a> {
     /// # Errors
     /// If it is not from 0 to 10¹².
     pub fn set_density(&mut self, density: Real) -> Result<(), Error> {
-        self.slot().density = super::error::in_range("density", density, 0.0, 1e12)?;
+        self.slot().density = crate::error::in_range("density", density, 0.0, 1e12)?;
         let body = self.slot().body;
         self.world.update_mass(body);
         Ok(())

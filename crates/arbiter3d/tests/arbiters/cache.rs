@@ -285,3 +285,19 @@ fn a_body_left_with_one_contact_is_not_turned_by_what_it_had_with_two() {
         world.body(body).unwrap().angular_velocity()
     );
 }
+
+/// Impulses that are reset start from nothing in the next step; the contacts stay where they are.
+#[test]
+fn reset_impulses_forget_the_past_and_keep_the_contacts() {
+    let (mut world, id, old) = loaded();
+    let data = world.arbiter_mut(id).unwrap().data_mut();
+    data.reset_impulses();
+    let contact = data.contact(0).unwrap();
+    assert_eq!((contact.normal_impulse(), contact.total_normal_impulse()), (0.0, 0.0));
+    assert_eq!((contact.tangent_impulse(), contact.local_anchor2()), (Vec3::ZERO, old.local_anchor2()));
+    let body = world.arbiter_by_id(id).unwrap().body2();
+    world.body_mut(body).unwrap().set_linear_velocity(Vec3::ZERO).unwrap();
+    world.step(5e-3).unwrap();
+    let again = world.arbiter_by_id(id).unwrap().data().contact(0).unwrap().total_normal_impulse();
+    assert!((again - 2.0 * 9.81 * 5e-3).abs() < 0.02, "the weight is carried again: {again}");
+}

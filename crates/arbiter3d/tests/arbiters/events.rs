@@ -192,4 +192,65 @@ fn custom_arbiters_take_the_materials_of_their_bodies() {
     world.arbiter_mut(id).unwrap().data_mut().set_friction(0.3).unwrap();
     world.shape_mut(shape).unwrap().set_material(rough).unwrap();
     assert_eq!(world.arbiter_by_id(id).unwrap().data().friction(), 0.3);
+    world.arbiter_mut(id).unwrap().data_mut().set_restitution(0.75).unwrap();
+    world.shape_mut(shape).unwrap().set_material(Material { restitution: 0.5, ..rough }).unwrap();
+    assert_eq!(world.arbiter_by_id(id).unwrap().data().restitution(), 0.75);
+}
+
+/// Sensors come by key too: 200 balls fall through as many sensors at once.
+#[test]
+fn sensor_events_come_alike_for_any_number_of_threads() {
+    let run = |threads: usize| {
+        let mut world = World::new(WorldSettings { threads, ..WorldSettings::default() }).unwrap();
+        for i in 0..400_u16 {
+            let at = Vec3::new(f32::from(i % 20) * 3.0, 0.0, f32::from(i / 20) * 3.0);
+            let trap = ShapeDefinition::new(Shape::cuboid(Vec3::ONE).unwrap()).at(at).sensor();
+            world.add_shape(BodyId::WORLD, &trap).unwrap();
+            add(&mut world, at + Vec3::Y * 1.6, Shape::sphere(0.5).unwrap());
+        }
+        let mut all = Vec::new();
+        for _ in 0..60 {
+            world.step(DT).unwrap();
+            all.push(world.drain_sensor_events().collect::<Vec<_>>());
+        }
+        all
+    };
+    let alone = run(1);
+    let busy: Vec<_> = alone.iter().filter(|events| !events.is_empty()).collect();
+    assert!(busy.len() == 2 && busy.iter().all(|events| events.len() == 400 && events.is_sorted()));
+    for threads in [2, 5] {
+        assert_eq!(run(threads), alone, "{threads} threads");
+    }
+}
+
+/// Listeners and providers are told how long the step is.
+#[test]
+fn listeners_know_the_length_of_the_step() {
+    let (mut world, ..) = touching_pair();
+    let told = Log::default();
+    let log = told.clone();
+    world.on_begin_collide(Box::new(move |context, _| log.push(context.dt())));
+    world.step(0.0125).unwrap();
+    assert_eq!(told.all(), [0.0125]);
+}
+
+/// By key, not by age: custom arbiters made in falling order, and ends in another order than that of making.
+#[test]
+fn custom_arbiters_begin_and_end_in_the_order_of_their_keys() {
+    let mut world = weightless();
+    let body = add_bare(&mut world, Vec3::ZERO);
+    let watch = Watch::body(&mut world, body);
+    let keys = [(9, 1), (4, 7), (4, 2), (u64::MAX, 0), (0, 5)].map(|(a, b)| ArbiterKey::new(a, b));
+    for key in keys {
+        let contact = ContactPoint::new(Vec3::ZERO, Vec3::ZERO, Vec3::Y);
+        world.register_contact_by_key(key, BodyId::WORLD, body, contact).unwrap();
+    }
+    let mut sorted = keys;
+    sorted.sort_unstable();
+    world.step(DT).unwrap();
+    assert_eq!(world.begin_events().iter().map(|event| event.key).collect::<Vec<_>>(), sorted);
+    assert_eq!(watch.begins.all().iter().map(|&id| world.arbiter_by_id(id).unwrap().key()).collect::<Vec<_>>(), sorted);
+    world.remove_body(body).unwrap();
+    assert_eq!(world.end_events().iter().map(|event| event.key).collect::<Vec<_>>(), sorted);
+    assert_eq!(watch.ends.all().iter().map(|event| event.key).collect::<Vec<_>>(), sorted);
 }

@@ -272,3 +272,22 @@ fn reserved_ids_never_clash_with_shapes_or_each_other() {
     assert!(world.reserve_ids(u64::MAX).is_err());
     assert_eq!(world.reserve_ids(1).unwrap().start, next.end + 1, "a refused call takes nothing");
 }
+
+/// A filter that lets more pass makes shapes collide that overlap already, also where they sleep.
+#[test]
+fn a_lifted_filter_lets_overlapping_shapes_collide() {
+    for asleep in [false, true] {
+        let (mut world, (a, _), (b, sb)) = touching_pair();
+        world.shape_mut(sb).unwrap().set_filter(Filter { mask: 0, ..Filter::default() });
+        world.step(DT).unwrap();
+        assert_eq!(world.arbiter_count(), 0);
+        if asleep {
+            world.body_mut(a).unwrap().sleep();
+            world.body_mut(b).unwrap().sleep();
+        }
+        world.shape_mut(sb).unwrap().set_filter(Filter::default());
+        world.step(DT).unwrap();
+        assert_eq!(only_arbiter(&world, a).data().contact_count(), 1, "asleep {asleep}");
+        assert!(world.body(a).unwrap().linear_velocity().x < 0.0, "and they are pushed apart");
+    }
+}

@@ -10,6 +10,7 @@ mod lifecycle;
 mod manifold;
 mod mission;
 mod misuse;
+mod random;
 mod reentrancy;
 mod sleep;
 mod solve_mode;

@@ -1,7 +1,7 @@
 //! What can go wrong at the API, each with what to do about it.
 
-use super::id::{BodyId, ShapeId};
 use crate::arbiter::{ArbiterId, ArbiterKey};
+use crate::id::{BodyId, ShapeId};
 use crate::math::{Quat, Real, Rotation, Vec3};
 use crate::shape::ShapeError;
 use crate::simd::SimdLevel;
