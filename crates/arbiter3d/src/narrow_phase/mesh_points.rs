@@ -39,8 +39,9 @@ const EQUALLY_DEEP: Real = 0.02;
 const TIE: Real = 1.000_001;
 
 /// A point that touches goes before one that stands off (the ends of a ridge before the corners that lean over it) if
-/// it adds at least this share of what that would.
-const BEARING_SHARE: Real = 0.05;
+/// it adds at least this share of what that would: as second, third and fourth point of its group. Past two points the
+/// corners matter more, else one is missing on the side to which the solid rocks.
+const BEARING_SHARES: [Real; 4] = [0.05, 0.5, 0.5, 1.0];
 /// A group stands off that is farther than the nearest by this many tolerances.
 const STANDS_OFF: Real = 2.5;
 /// A fourth point that adds less to the area of three than this share is not worth moving one for.
@@ -107,7 +108,11 @@ impl Candidates {
             let bearing = self.most_useful(&groups, &chosen, touching, limit);
             let widest = self.most_useful(&groups, &chosen, touching, Real::MAX);
             let next = match (bearing, widest) {
-                (Some(bearing), Some(widest)) if bearing.2 >= BEARING_SHARE * widest.2 => Some(bearing),
+                (Some(bearing), Some(widest))
+                    if bearing.2 >= BEARING_SHARES[chosen.counts[bearing.0] - 1] * widest.2 =>
+                {
+                    Some(bearing)
+                }
                 (_, Some(widest)) => Some(widest),
                 _ => self.most_useful(&groups, &chosen, ALL_GROUPS, Real::MAX),
             };
