@@ -20,12 +20,12 @@ use common::*;
 
 /// The hashes of the scenes, in their order.
 const GOLDEN: [(&str, u64); 6] = [
-    ("pile", 0xfe1c_e449_9257_c7bd),
-    ("hulls", 0x0759_4023_48c6_20c0),
-    ("mesh rain", 0x46d0_deea_3d67_84d4),
-    ("bullets", 0xc8b7_1fe5_5908_8e3a),
-    ("custom contacts", 0x7b46_df47_c114_3b7e),
-    ("coming and going", 0xb66d_9f34_e6b5_ec67),
+    ("pile", 0x21f8_4454_87a8_e62c),
+    ("hulls", 0x94d8_18a8_7bcf_1be2),
+    ("mesh rain", 0xb3a8_7230_c681_60ce),
+    ("bullets", 0xd6a7_057d_6b04_d919),
+    ("custom contacts", 0x2338_5f03_21e7_d705),
+    ("coming and going", 0x8e09_5a21_f8f3_2b4d),
 ];
 
 /// A scene: how it begins, and what is done before each step.
