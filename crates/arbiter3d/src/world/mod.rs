@@ -451,3 +451,14 @@ impl World {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::World;
+
+    #[test]
+    fn worlds_move_between_threads_and_are_queried_from_several() {
+        fn is_send_and_sync<T: Send + Sync>() {}
+        is_send_and_sync::<World>();
+    }
+}
