@@ -33,21 +33,23 @@ fn positions(world: &World, bodies: &[BodyId]) -> Vec<Vec3> {
     bodies.iter().map(|&body| position(world, body)).collect()
 }
 
+/// Runs the world and returns how far its blocks have gone: (sideways, down), metres.
+fn drift(world: &mut World, blocks: &[BodyId], seconds: f32, name: &str) -> (f32, f32) {
+    let start = positions(world, blocks);
+    run(world, seconds);
+    let (side, down) = displacement(world, blocks, &start);
+    let deepest = world.deepest_penetration();
+    println!("{name}: {:.3} mm sideways, {:.3} mm down; deepest {deepest}", side * 1e3, down * 1e3);
+    (side, down)
+}
+
 /// A tower of 40 cubes stands for a minute and sleeps.
 #[test]
 fn a_tower_of_40_cubes_stands_and_sleeps() {
     let mut world = world();
     floor(&mut world, 0.5);
     let blocks = tower(&mut world, 40);
-    let start = positions(&world, &blocks);
-    run(&mut world, 60.0);
-    let (side, down) = displacement(&world, &blocks, &start);
-    println!(
-        "tower: top moved {:.3} mm sideways, {:.3} mm down; deepest {}",
-        side * 1e3,
-        down * 1e3,
-        world.deepest_penetration()
-    );
+    let (side, down) = drift(&mut world, &blocks, 60.0, "tower");
     assert_eq!(world.awake_count(), 0, "it sleeps");
     assert!(side < 0.1 && down < 0.2, "moved {side} sideways, {down} down");
     assert!(world.deepest_penetration() < 0.01);
@@ -59,15 +61,7 @@ fn a_tower_of_40_cubes_stands_awake() {
     let mut world = sleepless();
     floor(&mut world, 0.5);
     let blocks = tower(&mut world, 40);
-    let start = positions(&world, &blocks);
-    run(&mut world, 60.0);
-    let (side, down) = displacement(&world, &blocks, &start);
-    println!(
-        "awake tower: {:.3} mm sideways, {:.3} mm down; deepest {}",
-        side * 1e3,
-        down * 1e3,
-        world.deepest_penetration()
-    );
+    let (side, down) = drift(&mut world, &blocks, 60.0, "awake tower");
     assert_eq!(world.awake_count(), 40);
     assert!(side < 0.1 && down < 0.2, "moved {side} sideways, {down} down");
     assert!(world.deepest_penetration() < 0.01);
@@ -79,15 +73,7 @@ fn a_pyramid_of_20_rows_stands_and_sleeps() {
     let mut world = world();
     floor(&mut world, 0.6);
     let blocks = pyramid(&mut world, 20);
-    let start = positions(&world, &blocks);
-    run(&mut world, 60.0);
-    let (side, down) = displacement(&world, &blocks, &start);
-    println!(
-        "pyramid: {:.3} mm sideways, {:.3} mm down; deepest {}",
-        side * 1e3,
-        down * 1e3,
-        world.deepest_penetration()
-    );
+    let (side, down) = drift(&mut world, &blocks, 60.0, "pyramid");
     assert_eq!(world.awake_count(), 0, "it sleeps");
     assert!(side < 0.03 && down < 0.1, "moved {side} sideways, {down} down");
     assert!(world.deepest_penetration() < 0.01);
@@ -99,10 +85,7 @@ fn a_pyramid_of_20_rows_stands_awake() {
     let mut world = sleepless();
     floor(&mut world, 0.6);
     let blocks = pyramid(&mut world, 20);
-    let start = positions(&world, &blocks);
-    run(&mut world, 20.0);
-    let (side, down) = displacement(&world, &blocks, &start);
-    println!("awake pyramid: {:.3} mm sideways, {:.3} mm down", side * 1e3, down * 1e3);
+    let (side, down) = drift(&mut world, &blocks, 20.0, "awake pyramid");
     assert!(side < 0.03 && down < 0.1, "moved {side} sideways, {down} down");
     assert!(world.deepest_penetration() < 0.01);
 }
@@ -115,10 +98,7 @@ fn a_stack_stands_far_from_the_origin() {
     add(&mut world, &BodyDefinition::fixed().at(far - Vec3::Y), &ShapeDefinition::new(cuboid(20.0, 1.0, 20.0)));
     let blocks: Vec<BodyId> =
         (0..12).map(|i| drop_shape(&mut world, &cube(0.5), far + Vec3::Y * (0.5 + i as f32))).collect();
-    let start = positions(&world, &blocks);
-    run(&mut world, 10.0);
-    let (side, down) = displacement(&world, &blocks, &start);
-    println!("far stack: {:.3} mm sideways, {:.3} mm down", side * 1e3, down * 1e3);
+    let (side, down) = drift(&mut world, &blocks, 10.0, "far stack");
     assert!(side < 0.02 && down < 0.05, "moved {side} sideways, {down} down");
 }
 

@@ -202,7 +202,6 @@ impl World {
         for index in arbiters {
             let arbiter = self.arbiters.at_mut(index);
             arbiter.data.clear();
-            arbiter.data.usage_mask = 0;
             if arbiter.pair != NONE {
                 let pair = arbiter.pair;
                 self.pairs[pair as usize].has_manifold = false;
