@@ -78,7 +78,7 @@ pub(crate) struct WorldSpec {
     pub substeps: Option<u32>,
     /// How many of the file's units make a metre: 1000 for millimetres. Default 1.
     pub length_unit: Option<Number>,
-    /// Overlap that contacts leave alone, metres. Default 0.005.
+    /// Scale of overlap that does not matter, metres: contacts at rest give at most 1.97 of it. Default 0.005.
     pub slop: Option<Number>,
     /// Gap below which contacts are found ahead of touching, metres. Default 0.02.
     pub speculative_distance: Option<Number>,
