@@ -84,9 +84,9 @@ pub(crate) struct WorldSpec {
     pub speculative_distance: Option<Number>,
     /// Gap or drift at which a cached contact breaks, metres. Default 0.02.
     pub contact_break_distance: Option<Number>,
-    /// Stiffness of contacts, Hz. Default 30.
+    /// Stiffness of contacts, Hz. Default 45.
     pub contact_hertz: Option<Number>,
-    /// Damping ratio of contacts. Default 10.
+    /// Damping ratio of contacts. Default 3.
     pub contact_damping_ratio: Option<Number>,
     /// Speed limit at which overlapping bodies are pushed apart, m/s. Default 3.
     pub push_out_speed: Option<Number>,
@@ -247,7 +247,7 @@ pub(crate) struct ShapeSpec {
     pub friction: Option<Number>,
     /// Share of the approach speed given back, 0 to 1. Default 0.
     pub restitution: Option<Number>,
-    /// Torque that resists rolling, as a share of normal force times radius. Default 0.
+    /// Torque that resists rolling, as a share of normal force times radius. Default 0.01.
     pub rolling_resistance: Option<Number>,
     /// Velocity of the surface in the body's frame, m/s: a conveyor belt. Default [0, 0, 0].
     pub tangent_velocity: Option<Triple>,
