@@ -56,6 +56,15 @@ impl<'a, T> SharedSlice<'a, T> {
         unsafe { &mut *self.start.add(index) }
     }
 
+    /// Asks for an element to be brought into the cache.
+    #[inline(always)]
+    pub fn prefetch(&self, index: usize) {
+        if index < self.len {
+            // SAFETY: in bounds; not read.
+            crate::simd::prefetch(unsafe { &*self.start.add(index).cast::<std::mem::MaybeUninit<T>>() });
+        }
+    }
+
     /// A run of elements.
     ///
     /// # Safety

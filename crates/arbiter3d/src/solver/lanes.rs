@@ -10,7 +10,7 @@ use crate::math::Real;
 use crate::parallel::{SharedSlice, StagePool};
 #[cfg(target_arch = "x86_64")]
 use crate::simd::{Avx2, Avx2Lanes, Avx512, Avx512Lanes, Sse2Lanes};
-use crate::simd::{Baseline, Instructions, Kernel, Lanes, SimdLevel, Wide};
+use crate::simd::{Baseline, Instructions, Kernel, Lanes, SimdLevel, Wide, prefetch};
 
 /// Wide rows that a thread takes at a time.
 const ROWS_PER_BLOCK: usize = 16;
@@ -192,6 +192,11 @@ impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> Kernel for Pre
     fn run(self) {
         let block = self.block;
         for (i, &(first, count)) in block.sources.iter().enumerate() {
+            if let Some(&(first, count)) = block.sources.get(i + 1) {
+                for source in &self.rows[first as usize..(first + count) as usize] {
+                    prefetch(&self.context.arbiters[source.arbiter as usize]);
+                }
+            }
             let target = RowTarget {
                 row: &mut block.normals[i],
                 friction: &mut block.frictions[i],
@@ -223,6 +228,11 @@ impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> Kernel for Sto
     fn run(self) {
         let (target, block) = (self.target, self.block);
         for (i, &(first, count)) in block.sources.iter().enumerate() {
+            if let Some(&(first, count)) = block.sources.get(i + 1) {
+                for source in &target.rows[first as usize..(first + count) as usize] {
+                    target.arbiters.prefetch(source.arbiter as usize);
+                }
+            }
             let solved = SolvedRow {
                 row: &block.normals[i],
                 friction: &block.frictions[i],
