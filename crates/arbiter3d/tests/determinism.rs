@@ -20,12 +20,12 @@ use common::*;
 
 /// The hashes of the scenes, in their order.
 const GOLDEN: [(&str, u64); 6] = [
-    ("pile", 0x1a5e_296a_ead0_88d5),
-    ("hulls", 0x4876_a5e1_0956_638d),
-    ("mesh rain", 0x03f2_8b5c_dfa4_5b98),
-    ("bullets", 0xdaa7_f3d3_c903_d615),
+    ("pile", 0x6f2c_36bc_5885_9a11),
+    ("hulls", 0x9bca_e776_81d4_06fc),
+    ("mesh rain", 0xd893_319c_3693_68a0),
+    ("bullets", 0x621f_3e00_bcff_ab88),
     ("custom contacts", 0x0b54_1ffe_d78b_9a9d),
-    ("coming and going", 0xba63_fd4d_d06f_0fa1),
+    ("coming and going", 0xbc66_b538_b506_141b),
 ];
 
 /// A scene: how it begins, and what is done before each step.

@@ -37,6 +37,16 @@ impl<W: Number> LaneVec3<W> {
         Self { x: self.x * o.x, y: self.y * o.y, z: self.z * o.z }
     }
 
+    /// The same where `mask > 0`, else zero.
+    #[inline(always)]
+    pub fn if_positive(&self, mask: W) -> Self {
+        Self {
+            x: mask.if_positive(self.x, W::ZERO),
+            y: mask.if_positive(self.y, W::ZERO),
+            z: mask.if_positive(self.z, W::ZERO),
+        }
+    }
+
     /// `self + o · s`.
     #[inline(always)]
     pub fn add_scaled(&self, o: &Self, s: W) -> Self {
@@ -100,6 +110,32 @@ impl<W: Number> LaneRotation<W> {
     pub fn rotate(&self, v: &LaneVec3<W>) -> LaneVec3<W> {
         let t = self.vector.cross(v).scale(W::splat(2.0));
         *v + t.scale(self.w) + self.vector.cross(&t)
+    }
+
+    /// [`crate::math::Rotation::inverse_rotate`] in lanes.
+    #[inline(always)]
+    pub fn inverse_rotate(&self, v: &LaneVec3<W>) -> LaneVec3<W> {
+        let u = LaneVec3 { x: -self.vector.x, y: -self.vector.y, z: -self.vector.z };
+        Self { vector: u, w: self.w }.rotate(v)
+    }
+
+    /// [`crate::math::Rotation::integrate`] in lanes.
+    #[inline(always)]
+    pub fn integrate(&self, angle: &LaneVec3<W>) -> Self {
+        let grow = W::splat(0.5) * (W::splat(1.0) + angle.dot(angle) * W::splat(1.0 / 12.0));
+        let (half, u, w) = (angle.scale(grow), &self.vector, self.w);
+        let x = u.x + half.x * w + half.y * u.z - half.z * u.y;
+        let y = u.y - half.x * u.z + half.y * w + half.z * u.x;
+        let z = u.z + half.x * u.y - half.y * u.x + half.z * w;
+        let w = w - half.x * u.x - half.y * u.y - half.z * u.z;
+        // Of unit length; the identity where the length is zero or not finite.
+        let squared = x * x + y * y + z * z + w * w;
+        let regular = (squared - W::splat(1e-30)).min(W::splat(1e30) - squared);
+        let s = W::splat(1.0) / squared.sqrt();
+        Self {
+            vector: LaneVec3 { x: x * s, y: y * s, z: z * s }.if_positive(regular),
+            w: regular.if_positive(w * s, W::splat(1.0)),
+        }
     }
 }
 

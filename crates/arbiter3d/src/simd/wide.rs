@@ -79,8 +79,8 @@ pub(crate) trait Lanes<const L: usize>: Number {
     #[inline(always)]
     fn load_quad<const N: usize>(records: &[&[Quad; N]; L], k: usize) -> [Self; 4] {
         let mut quads = [&[0.0; 4]; L];
-        for lane in 0..L {
-            quads[lane] = &records[lane][k];
+        for (quad, record) in quads.iter_mut().zip(records) {
+            *quad = &record[k];
         }
         Self::load(&quads)
     }
@@ -134,9 +134,9 @@ impl<const L: usize> Lanes<L> for Wide<L> {
     #[inline(always)]
     fn load(records: &[&Quad; L]) -> [Self; 4] {
         let mut columns = [Self::ZERO; 4];
-        for lane in 0..L {
+        for (lane, record) in records.iter().enumerate() {
             for k in 0..4 {
-                columns[k].0[lane] = records[lane][k];
+                columns[k].0[lane] = record[k];
             }
         }
         columns

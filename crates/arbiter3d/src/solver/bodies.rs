@@ -22,24 +22,29 @@ pub(crate) struct BodyState {
     pub angular_velocity: Vec3,
     pub translation: Vec3,
     pub turn: Vec3,
-    /// Whether a row acts on the body in this step.
-    pub constrained: u32,
+    /// 1 if a row acts on the body in this step, else 0.
+    pub constrained: Real,
     /// Whether contacts can move the body at all: dynamic, enabled, not locked on all axes.
     pub moves: u32,
     unused: [u32; 2],
 }
 
+impl BodyState {
+    /// A body that rests and is not there.
+    pub const NONE: Self = Self {
+        linear_velocity: Vec3::ZERO,
+        angular_velocity: Vec3::ZERO,
+        translation: Vec3::ZERO,
+        turn: Vec3::ZERO,
+        constrained: 0.0,
+        moves: 0,
+        unused: [0; 2],
+    };
+}
+
 impl Default for BodyState {
     fn default() -> Self {
-        Self {
-            linear_velocity: Vec3::ZERO,
-            angular_velocity: Vec3::ZERO,
-            translation: Vec3::ZERO,
-            turn: Vec3::ZERO,
-            constrained: 0,
-            moves: 0,
-            unused: [0; 2],
-        }
+        Self::NONE
     }
 }
 
@@ -73,14 +78,19 @@ pub(crate) struct BodyMass {
     pub inverse_inertia: SymmetricMat3,
 }
 
+impl BodyMass {
+    /// A body at the origin that nothing moves.
+    pub const NONE: Self = Self {
+        center: Vec3::ZERO,
+        rotation: Rotation::IDENTITY,
+        inverse_mass: Vec3::ZERO,
+        inverse_inertia: SymmetricMat3::ZERO,
+    };
+}
+
 impl Default for BodyMass {
     fn default() -> Self {
-        Self {
-            center: Vec3::ZERO,
-            rotation: Rotation::IDENTITY,
-            inverse_mass: Vec3::ZERO,
-            inverse_inertia: SymmetricMat3::ZERO,
-        }
+        Self::NONE
     }
 }
 
@@ -93,6 +103,13 @@ impl BodyMass {
         unsafe { &*std::ptr::from_ref(self).cast() }
     }
 
+    /// The same, to change.
+    #[inline(always)]
+    pub fn quads_mut(&mut self) -> &mut [Quad; 4] {
+        // SAFETY: as above.
+        unsafe { &mut *std::ptr::from_mut(self).cast() }
+    }
+
     /// Pose of the frame at the centre of mass.
     #[inline(always)]
     pub fn pose(&self) -> Pose {
@@ -100,50 +117,67 @@ impl BodyMass {
     }
 }
 
-/// What the integrator needs.
+/// What the integrator needs: 128 bytes, in groups of four numbers as it loads them.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct BodyMotion {
     /// Velocities before this substep's contact impulses; what they added is warm starting for the next substep.
     pub free_linear: Vec3,
+    pub linear_damping: Real,
     pub free_angular: Vec3,
+    pub angular_damping: Real,
     /// Acceleration by gravity and forces in this step.
     pub acceleration: Vec3,
+    /// 1 if nothing but its velocity moves it, else 0.
+    pub kinematic: Real,
     pub angular_acceleration: Vec3,
+    /// 1 if the torque-free spin changes, else 0: the inertia is not that of a ball, and no rotation is locked.
+    pub gyroscopic: Real,
     /// What rounding has lost when gravity was added, to be added later (Kahan).
     pub residual: Vec3,
+    /// 1 if a velocity overflowed in this step, else 0.
+    pub broken: Real,
     /// Inertia in body axes and its inverse.
     pub inertia: SymmetricMat3,
     pub inverse_inertia: SymmetricMat3,
-    pub linear_damping: Real,
-    pub angular_damping: Real,
-    /// 1 for each free world axis of rotation.
-    pub free_rotation: Vec3,
-    /// Whether nothing but its velocity moves it.
-    pub kinematic: bool,
-    /// Whether the torque-free spin changes: the inertia is not that of a ball, and no rotation is locked.
-    pub gyroscopic: bool,
-    /// Whether a velocity overflowed in this step.
-    pub broken: bool,
 }
 
 impl Default for BodyMotion {
     fn default() -> Self {
-        Self {
-            free_linear: Vec3::ZERO,
-            free_angular: Vec3::ZERO,
-            acceleration: Vec3::ZERO,
-            angular_acceleration: Vec3::ZERO,
-            residual: Vec3::ZERO,
-            inertia: SymmetricMat3::ZERO,
-            inverse_inertia: SymmetricMat3::ZERO,
-            linear_damping: 0.0,
-            angular_damping: 0.0,
-            free_rotation: Vec3::ONE,
-            kinematic: false,
-            gyroscopic: false,
-            broken: false,
-        }
+        Self::NONE
+    }
+}
+
+impl BodyMotion {
+    /// Nothing that moves.
+    pub const NONE: Self = Self {
+        free_linear: Vec3::ZERO,
+        linear_damping: 0.0,
+        free_angular: Vec3::ZERO,
+        angular_damping: 0.0,
+        acceleration: Vec3::ZERO,
+        kinematic: 0.0,
+        angular_acceleration: Vec3::ZERO,
+        gyroscopic: 0.0,
+        residual: Vec3::ZERO,
+        broken: 0.0,
+        inertia: SymmetricMat3::ZERO,
+        inverse_inertia: SymmetricMat3::ZERO,
+    };
+
+    /// The record as groups of four numbers.
+    #[inline(always)]
+    pub fn quads(&self) -> &[Quad; 8] {
+        const { assert!(size_of::<Self>() == size_of::<[Quad; 8]>()) };
+        // SAFETY: `repr(C)`, 32 floats.
+        unsafe { &*std::ptr::from_ref(self).cast() }
+    }
+
+    /// The same, to change.
+    #[inline(always)]
+    pub fn quads_mut(&mut self) -> &mut [Quad; 8] {
+        // SAFETY: as above.
+        unsafe { &mut *std::ptr::from_mut(self).cast() }
     }
 }
 

@@ -124,8 +124,8 @@ impl RowPlan {
     fn color(&mut self, arbiter: &Arbiter, bodies: &mut SolverBodies) -> u8 {
         let (a, b) = (arbiter.body1.index as usize, arbiter.body2.index as usize);
         let (a_moves, b_moves) = (bodies.states[a].moves != 0, bodies.states[b].moves != 0);
-        bodies.states[a].constrained = 1;
-        bodies.states[b].constrained = 1;
+        bodies.states[a].constrained = 1.0;
+        bodies.states[b].constrained = 1.0;
         if a_moves && b_moves {
             let free = !(self.used[a] | self.used[b]);
             if free == 0 {

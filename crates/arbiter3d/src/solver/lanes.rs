@@ -2,6 +2,7 @@
 
 use super::bodies::{BodyState, SharedStates};
 use super::coloring::{CLASSES, RowPlan, RowSource};
+use super::integrate::{IntegrateKernel, IntegrateParameters, IntegrateTarget, Integration};
 use super::prepare::{PrepareContext, RowTarget, SolvedRow, prepare_row, read_row, store_lane};
 use super::rows::{ExtraRow, FrictionRow, NormalRow, RowFeatures};
 use super::solve::{PassParameters, RowPass};
@@ -11,6 +12,7 @@ use crate::parallel::{SharedSlice, StagePool};
 #[cfg(target_arch = "x86_64")]
 use crate::simd::{Avx2, Avx2Lanes, Avx512, Avx512Lanes, Sse2Lanes};
 use crate::simd::{Baseline, Instructions, Kernel, Lanes, SimdLevel, Wide, prefetch};
+use std::marker::PhantomData;
 
 /// Wide rows that a thread takes at a time.
 const ROWS_PER_BLOCK: usize = 16;
@@ -36,6 +38,15 @@ pub(crate) trait ContactSolver: Send + Sync {
         pass: Pass,
         states: &mut [BodyState],
         parameters: &PassParameters,
+        pool: &mut StagePool,
+    );
+
+    /// Integrates velocities or positions of bodies.
+    fn integrate(
+        &self,
+        phase: Integration,
+        target: IntegrateTarget<'_>,
+        parameters: &IntegrateParameters,
         pool: &mut StagePool,
     );
 
@@ -391,6 +402,19 @@ impl<I: Instructions, W: Lanes<L>, const L: usize> ContactSolver for LaneSolver<
                     _ => level.run(PassKernel { block: group.four.block(block), pass, states, parameters }),
                 }
             }
+        });
+    }
+
+    fn integrate(
+        &self,
+        phase: Integration,
+        target: IntegrateTarget<'_>,
+        parameters: &IntegrateParameters,
+        pool: &mut StagePool,
+    ) {
+        let target = &target;
+        pool.run(target.blocks(), |block| {
+            self.level.run(IntegrateKernel::<W, L> { target, block, phase, parameters, lanes: PhantomData });
         });
     }
 

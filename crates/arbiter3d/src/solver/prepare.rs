@@ -15,7 +15,7 @@ use super::bodies::{BodyMass, READ_ONLY, SharedStates, SolverBodies, gather};
 use super::coloring::RowSource;
 use super::rows::{ExtraRow, FrictionRow, NormalRow, RowFeatures};
 use crate::arbiter::{Arbiter, Contact, ONE_NORMAL, SLOTS, SolveMode};
-use crate::math::{Real, Rotation, SymmetricMat3, Vec3};
+use crate::math::{Real, Vec3};
 use crate::simd::{LaneRotation, LaneSymmetric, LaneVec3, Lanes, Number, Quad};
 
 /// What preparing and storing read.
@@ -74,12 +74,7 @@ static NO_CONTACT: Contact = Contact {
 };
 
 /// The body of an empty lane.
-static NO_BODY: BodyMass = BodyMass {
-    center: Vec3::ZERO,
-    rotation: Rotation::IDENTITY,
-    inverse_mass: Vec3::ZERO,
-    inverse_inertia: SymmetricMat3::ZERO,
-};
+static NO_BODY: BodyMass = BodyMass::NONE;
 
 /// Fills a wide row from its sources; lanes past the end of `sources` stay empty.
 #[inline(always)]

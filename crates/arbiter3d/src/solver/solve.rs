@@ -154,8 +154,8 @@ impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> RowPass<'_, W,
         let (row, friction, extra) = (&mut *self.row, &mut *self.friction, &*self.extra);
         let threshold = W::splat(-pass.restitution_threshold);
         let mut own = [W::ZERO; P];
-        for i in 0..P {
-            own[i] = row.points[i].mass.inverse_or_zero();
+        for (own, point) in own.iter_mut().zip(&row.points) {
+            *own = point.mass.inverse_or_zero();
         }
         let mut sum = Impulse::ZERO;
         for _ in 0..if P > 1 { RESTITUTION_SWEEPS } else { 1 } {
@@ -209,8 +209,8 @@ impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> RowPass<'_, W,
         let common = row.normal.dot(&(sides.v2.linear - sides.v1.linear)) + row.offset.dot(w2);
         let spin = *w2 - *w1;
         let mut velocities = [common; P];
-        for i in 0..P {
-            velocities[i] = common + row.points[i].arm.dot(&spin);
+        for (velocity, point) in velocities.iter_mut().zip(&row.points) {
+            *velocity = common + point.arm.dot(&spin);
         }
         velocities
     }
@@ -222,8 +222,8 @@ impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> RowPass<'_, W,
         let common = row.normal.dot(&(sides.d2.translation - sides.d1.translation)) + row.offset.dot(t2);
         let turned = *t2 - *t1;
         let mut separations = [common; P];
-        for i in 0..P {
-            separations[i] = row.points[i].separation + common + row.points[i].arm.dot(&turned);
+        for (separation, point) in separations.iter_mut().zip(&row.points) {
+            *separation = point.separation + common + point.arm.dot(&turned);
         }
         separations
     }
