@@ -12,7 +12,8 @@
 
 use super::mesh_points::{Candidate, Candidates, NO_FACET};
 use super::polyhedron::{CuboidFeatures, Polyhedron};
-use super::triangle::{Frame, Reach, Solid, Triangle};
+use super::triangle::{Frame, Group, Reach, Solid};
+use super::triangle_lanes::Near;
 use super::triangle_solid::Solids;
 use super::{Manifold, ManifoldPoint, PairCache};
 use crate::math::{Aabb, Mat3, Pose, Real, Vec3};
@@ -71,23 +72,34 @@ impl Contact<'_> {
 
     /// Adds the points of all triangles near the shape. Returns whether one might overlap that gave no point.
     fn touch_all(&self, solid: &mut impl Solid, frame: &Frame, reach: &Reach, out: &mut Candidates) -> bool {
-        let center = frame.position + frame.rotation * solid.center();
-        let far = solid.outer_radius() + self.margin;
-        let bounds = solid.bounds().expand(self.margin);
+        let near = Near {
+            frame,
+            aabb: self.aabb,
+            bounds: solid.bounds().expand(self.margin),
+            center: frame.position + frame.rotation * solid.center(),
+            far: solid.outer_radius() + self.margin,
+            one_sided: self.mesh.sides() == MeshSides::One,
+            behind: BEHIND * reach.scale,
+        };
         let mut missing = false;
-        self.mesh.for_each_facet(&self.aabb, |index| {
-            let facet = self.mesh.facet(index);
-            let height = facet.normal.dot(center - facet.corners[0]);
-            let front = height >= 0.0 || (self.mesh.sides() == MeshSides::One && height >= -BEHIND * reach.scale);
-            if height.abs() > far || (!front && self.mesh.sides() == MeshSides::One) {
-                return;
+        let mut touching = Group::default();
+        let mut found = Group::default();
+        let mut sift = |found: &mut Group| {
+            let sides = near.sides(found.facets(self.mesh));
+            for (k, &side) in sides[..found.count].iter().enumerate() {
+                if side != 0.0 && touching.push(found.indices[k], side) {
+                    missing |= solid.touch_group(self.mesh, frame, &mut touching, reach, out);
+                }
             }
-            let side = if front { 1.0 } else { -1.0 };
-            if let Some(triangle) = Triangle::new(self.mesh, frame, index, side, &bounds) {
-                missing |= solid.touch(&triangle, reach, out);
+            found.count = 0;
+        };
+        self.mesh.for_each_candidate(&self.aabb, |index| {
+            if found.push(index as u32, 0.0) {
+                sift(&mut found);
             }
         });
-        missing
+        sift(&mut found);
+        missing | solid.touch_group(self.mesh, frame, &mut touching, reach, out)
     }
 }
 

@@ -232,6 +232,13 @@ impl TriangleMesh {
         });
     }
 
+    /// Calls `visit` with the internal number of every triangle in a leaf of the tree whose box overlaps `aabb`, in
+    /// ascending order.
+    #[inline(always)]
+    pub(crate) fn for_each_candidate(&self, aabb: &Aabb, visit: impl FnMut(usize)) {
+        self.tree.query(aabb, visit);
+    }
+
     /// A triangle by its internal number.
     #[inline(always)]
     pub(crate) fn facet(&self, index: usize) -> &Facet {
