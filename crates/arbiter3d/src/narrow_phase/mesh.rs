@@ -17,7 +17,7 @@ use super::triangle_lanes::Near;
 use super::triangle_solid::Solids;
 use super::{Manifold, ManifoldPoint, PairCache};
 use crate::math::{Aabb, Mat3, Pose, Real, Vec3};
-use crate::shape::{MeshSides, Shape, TriangleMesh};
+use crate::shape::{MeshSides, OCTET, Shape, TriangleMesh};
 
 /// How far behind a one-sided triangle a centre may be and still be pushed out in front, as a share of the scale of
 /// the contact: a body that is halfway through does not flicker.
@@ -83,22 +83,27 @@ impl Contact<'_> {
         };
         let mut missing = false;
         let mut touching = Group::default();
-        let mut found = Group::default();
-        let mut sift = |found: &mut Group| {
-            let sides = near.sides(found.facets(self.mesh));
-            for (k, &side) in sides[..found.count].iter().enumerate() {
-                if side != 0.0 && touching.push(found.indices[k], side) {
+        let mut sift = |octet: usize, found: u8| {
+            let sides = near.sides(self.mesh.octet(octet));
+            for (k, &side) in sides.iter().enumerate() {
+                let wanted = (found >> k & 1 == 1) & (side != 0.0);
+                if wanted && touching.push((octet * OCTET + k) as u32, side) {
                     missing |= solid.touch_group(self.mesh, frame, &mut touching, reach, out);
                 }
             }
-            found.count = 0;
         };
+        // The tree gives ascending numbers: those of one octet in a row.
+        let (mut octet, mut found) = (0, 0_u8);
         self.mesh.for_each_candidate(&self.aabb, |index| {
-            if found.push(index as u32, 0.0) {
-                sift(&mut found);
+            if index / OCTET != octet && found != 0 {
+                sift(octet, std::mem::take(&mut found));
             }
+            octet = index / OCTET;
+            found |= 1 << (index % OCTET);
         });
-        sift(&mut found);
+        if found != 0 {
+            sift(octet, found);
+        }
         missing | solid.touch_group(self.mesh, frame, &mut touching, reach, out)
     }
 }

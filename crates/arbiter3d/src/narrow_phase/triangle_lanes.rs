@@ -11,12 +11,12 @@
 use super::polyhedron::Polyhedron;
 use super::triangle::Frame;
 use crate::math::{Aabb, Mat3, Real, Vec3};
-use crate::shape::Facet;
+use crate::shape::{Facet, OCTET, Octet};
 use crate::simd::{Kernel, Wide, WideVec3, run_widest};
 use std::array::from_fn;
 
 /// Triangles in a group.
-pub(super) const LANES: usize = 8;
+pub(super) const LANES: usize = OCTET;
 
 type Lanes = Wide<LANES>;
 type Vectors = WideVec3<LANES>;
@@ -44,16 +44,16 @@ pub(super) struct Near<'a> {
 
 impl Near<'_> {
     /// For each triangle on which side of it the shape is (1 in front, −1 behind), 0 if it is out of reach.
-    pub(super) fn sides(&self, facets: [&Facet; LANES]) -> [Real; LANES] {
+    pub(super) fn sides(&self, octet: &Octet) -> [Real; LANES] {
         let mut sides = [0.0; LANES];
-        run_widest(Sift { near: self, facets, sides: &mut sides });
+        run_widest(Sift { near: self, octet, sides: &mut sides });
         sides
     }
 }
 
 struct Sift<'a> {
     near: &'a Near<'a>,
-    facets: [&'a Facet; LANES],
+    octet: &'a Octet,
     sides: &'a mut [Real; LANES],
 }
 
@@ -61,14 +61,14 @@ impl Kernel for Sift<'_> {
     #[inline(always)]
     fn run(self) {
         let near = self.near;
-        let corners = gather_corners(&self.facets);
-        let height = gather(&self.facets, |facet| facet.normal).dot(&(splat(near.center) - corners[0]));
+        let corners = &self.octet.corners;
+        let height = self.octet.normal.dot(&(splat(near.center) - corners[0]));
         let (behind, other) = if near.one_sided { (-near.behind, 0.0) } else { (0.0, -1.0) };
         let sides = not_below(height, Lanes::splat(behind), Lanes::splat(1.0), Lanes::splat(other));
         let sides = not_below(Lanes::splat(near.far), absolute(height), sides, Lanes::ZERO);
-        let sides = keep_overlapping(sides, &corners, &near.aabb);
+        let sides = keep_overlapping(sides, corners, &near.aabb);
         let position = splat(near.frame.position);
-        let local = turn_corners(&near.frame.inverse, &from_position(&corners, &position));
+        let local = turn_corners(&near.frame.inverse, &from_position(corners, &position));
         *self.sides = keep_overlapping(sides, &local, &near.bounds).0;
     }
 }

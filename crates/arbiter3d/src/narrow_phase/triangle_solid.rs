@@ -101,6 +101,9 @@ impl Solid for Solids<'_> {
         reach: &Reach,
         out: &mut Candidates,
     ) -> bool {
+        if group.count == 0 {
+            return false;
+        }
         let search = LeastOverlap {
             solid: &self.features,
             frame,
