@@ -158,6 +158,17 @@ impl Instructions for Avx512 {
     }
 }
 
+/// Runs a kernel with the widest lanes that kernels outside the solver use: eight. For those too short to choose per step.
+#[inline]
+pub(crate) fn run_widest<K: Kernel>(kernel: K) {
+    #[cfg(target_arch = "x86_64")]
+    if let Some(avx2) = Avx2::detect() {
+        avx2.run(kernel);
+        return;
+    }
+    kernel.run();
+}
+
 /// Work to be compiled once per instruction set; implement `run` as `#[inline(always)]`.
 pub(crate) trait Kernel {
     /// Does the work.
