@@ -12,7 +12,7 @@ use super::ShapeError;
 use super::mesh_edges::{Adjacency, Neighborhood};
 use super::mesh_tree::{MeshTree, Slabs};
 use crate::math::{Aabb, Real, Vec3};
-use crate::simd::WideVec3;
+use crate::simd::{LaneVec3, Wide};
 
 pub use super::mesh_edges::MeshEdge;
 pub use super::mesh_tree::MeshNode;
@@ -68,18 +68,18 @@ pub(crate) const OCTET: usize = 8;
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub(crate) struct Octet {
-    pub(crate) corners: [WideVec3<OCTET>; 3],
-    pub(crate) normal: WideVec3<OCTET>,
+    pub(crate) corners: [LaneVec3<Wide<OCTET>>; 3],
+    pub(crate) normal: LaneVec3<Wide<OCTET>>,
 }
 
 impl Octet {
     fn new(facets: &[Facet]) -> Self {
-        let mut octet = Self { corners: [WideVec3::ZERO; 3], normal: WideVec3::ZERO };
+        let mut octet = Self { corners: [LaneVec3::ZERO; 3], normal: LaneVec3::ZERO };
         for (lane, facet) in facets.iter().enumerate() {
             for (corners, corner) in octet.corners.iter_mut().zip(facet.corners) {
-                corners.set(lane, corner);
+                corners.set::<OCTET>(lane, corner);
             }
-            octet.normal.set(lane, facet.normal);
+            octet.normal.set::<OCTET>(lane, facet.normal);
         }
         octet
     }

@@ -158,15 +158,32 @@ impl Instructions for Avx512 {
     }
 }
 
-/// Runs a kernel with the widest lanes that kernels outside the solver use: eight. For those too short to choose per step.
+/// Work on eight lanes at once, whatever the machine has: for kernels too short to be told their level in each step.
+/// Implement `run` as `#[inline(always)]`.
+pub(crate) trait KernelOfEight {
+    /// Does the work.
+    fn run<W: Lanes<8>>(self);
+}
+
+/// Runs a kernel of eight lanes with AVX2 where there is AVX2, else with what every machine has.
 #[inline]
-pub(crate) fn run_widest<K: Kernel>(kernel: K) {
+pub(crate) fn run_eight<K: KernelOfEight>(kernel: K) {
     #[cfg(target_arch = "x86_64")]
     if let Some(avx2) = Avx2::detect() {
-        avx2.run(kernel);
+        avx2.run(Eight::<K, Avx2Lanes>(kernel, std::marker::PhantomData));
         return;
     }
-    kernel.run();
+    kernel.run::<Wide<8>>();
+}
+
+/// A kernel of eight lanes with its lanes chosen.
+struct Eight<K, W>(K, std::marker::PhantomData<W>);
+
+impl<K: KernelOfEight, W: Lanes<8>> Kernel for Eight<K, W> {
+    #[inline(always)]
+    fn run(self) {
+        self.0.run::<W>();
+    }
 }
 
 /// Work to be compiled once per instruction set; implement `run` as `#[inline(always)]`.

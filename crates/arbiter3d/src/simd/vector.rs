@@ -1,6 +1,6 @@
 //! Vectors, rotations and symmetric matrices in lanes, each lane on its own.
 
-use super::{Lanes, Number};
+use super::{Lanes, Number, Wide};
 use crate::math::Vec3;
 use std::ops::{Add, Sub};
 
@@ -15,6 +15,12 @@ pub(crate) struct LaneVec3<W> {
 
 impl<W: Number> LaneVec3<W> {
     pub const ZERO: Self = Self { x: W::ZERO, y: W::ZERO, z: W::ZERO };
+
+    /// The same vector in all lanes.
+    #[inline(always)]
+    pub fn splat(v: Vec3) -> Self {
+        Self { x: W::splat(v.x), y: W::splat(v.y), z: W::splat(v.z) }
+    }
 
     #[inline(always)]
     pub fn dot(&self, o: &Self) -> W {
@@ -57,6 +63,14 @@ impl<W: Number> LaneVec3<W> {
     #[inline(always)]
     pub fn sub_scaled(&self, o: &Self, s: W) -> Self {
         Self { x: self.x - o.x * s, y: self.y - o.y * s, z: self.z - o.z * s }
+    }
+}
+
+impl<const L: usize> LaneVec3<Wide<L>> {
+    /// The same numbers in lanes of another kind.
+    #[inline(always)]
+    pub fn to_lanes<W: Lanes<L>>(&self) -> LaneVec3<W> {
+        LaneVec3 { x: W::from_array(self.x.0), y: W::from_array(self.y.0), z: W::from_array(self.z.0) }
     }
 }
 

@@ -42,6 +42,15 @@ pub(crate) trait Number:
     /// In each lane `yes` where `self > 0`, else `no`.
     fn if_positive(self, yes: Self, no: Self) -> Self;
 
+    /// In each lane `yes` where `self >= other`, else `no`.
+    fn if_at_least(self, other: Self, yes: Self, no: Self) -> Self;
+
+    /// In each lane `yes` where `self > other`, else `no`.
+    fn if_above(self, other: Self, yes: Self, no: Self) -> Self;
+
+    /// Without its sign.
+    fn abs(self) -> Self;
+
     /// `1 / self` where `self > 0`, else 0.
     #[inline(always)]
     fn inverse_or_zero(self) -> Self {
@@ -117,6 +126,21 @@ impl<const L: usize> Number for Wide<L> {
     #[inline(always)]
     fn if_positive(self, yes: Self, no: Self) -> Self {
         Self(from_fn(|i| if self.0[i] > 0.0 { yes.0[i] } else { no.0[i] }))
+    }
+
+    #[inline(always)]
+    fn if_at_least(self, other: Self, yes: Self, no: Self) -> Self {
+        Self(from_fn(|i| if self.0[i] >= other.0[i] { yes.0[i] } else { no.0[i] }))
+    }
+
+    #[inline(always)]
+    fn if_above(self, other: Self, yes: Self, no: Self) -> Self {
+        Self(from_fn(|i| if self.0[i] > other.0[i] { yes.0[i] } else { no.0[i] }))
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(from_fn(|i| self.0[i].abs()))
     }
 }
 

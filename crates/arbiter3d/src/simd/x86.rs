@@ -17,8 +17,8 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 /// Implements the arithmetic of one register type.
 macro_rules! register {
     ($(#[$meta:meta])* $name:ident($register:ty), $lanes:literal lanes,
-     $add:ident $sub:ident $mul:ident $div:ident $sqrt:ident $min:ident $max:ident $set1:ident,
-     |$x:ident, $yes:ident, $no:ident| $select:expr) => {
+     $add:ident $sub:ident $mul:ident $div:ident $sqrt:ident $min:ident $max:ident $set1:ident $andnot:ident,
+     |$a:ident, $b:ident, $yes:ident, $no:ident| above $above:expr, at least $at_least:expr) => {
         $(#[$meta])*
         #[derive(Clone, Copy, Debug)]
         #[repr(transparent)]
@@ -82,9 +82,27 @@ macro_rules! register {
 
             #[inline(always)]
             fn if_positive(self, yes: Self, no: Self) -> Self {
-                let ($x, $yes, $no) = (self.0, yes.0, no.0);
+                self.if_above(Self::ZERO, yes, no)
+            }
+
+            #[inline(always)]
+            fn if_above(self, other: Self, yes: Self, no: Self) -> Self {
+                let ($a, $b, $yes, $no) = (self.0, other.0, yes.0, no.0);
                 // SAFETY: as above.
-                Self(unsafe { $select })
+                Self(unsafe { $above })
+            }
+
+            #[inline(always)]
+            fn if_at_least(self, other: Self, yes: Self, no: Self) -> Self {
+                let ($a, $b, $yes, $no) = (self.0, other.0, yes.0, no.0);
+                // SAFETY: as above.
+                Self(unsafe { $at_least })
+            }
+
+            #[inline(always)]
+            fn abs(self) -> Self {
+                // SAFETY: as above.
+                Self(unsafe { $andnot($set1(-0.0), self.0) })
             }
         }
     };
@@ -103,26 +121,47 @@ macro_rules! register {
 register!(
     /// Four lanes of SSE2.
     Sse2Lanes(__m128), 4 lanes,
-    _mm_add_ps _mm_sub_ps _mm_mul_ps _mm_div_ps _mm_sqrt_ps _mm_min_ps _mm_max_ps _mm_set1_ps,
-    |x, yes, no| {
-        let positive = _mm_cmplt_ps(_mm_setzero_ps(), x);
-        _mm_or_ps(_mm_and_ps(positive, yes), _mm_andnot_ps(positive, no))
-    }
+    _mm_add_ps _mm_sub_ps _mm_mul_ps _mm_div_ps _mm_sqrt_ps _mm_min_ps _mm_max_ps _mm_set1_ps _mm_andnot_ps,
+    |a, b, yes, no| above sse2_select(_mm_cmplt_ps(b, a), yes, no), at least sse2_select(_mm_cmple_ps(b, a), yes, no)
 );
 
 register!(
     /// Eight lanes of AVX2.
     Avx2Lanes(__m256), 8 lanes,
-    _mm256_add_ps _mm256_sub_ps _mm256_mul_ps _mm256_div_ps _mm256_sqrt_ps _mm256_min_ps _mm256_max_ps _mm256_set1_ps,
-    |x, yes, no| _mm256_blendv_ps(no, yes, _mm256_cmp_ps::<_CMP_LT_OQ>(_mm256_setzero_ps(), x))
+    _mm256_add_ps _mm256_sub_ps _mm256_mul_ps _mm256_div_ps _mm256_sqrt_ps _mm256_min_ps _mm256_max_ps _mm256_set1_ps
+    _mm256_andnot_ps,
+    |a, b, yes, no| above _mm256_blendv_ps(no, yes, _mm256_cmp_ps::<_CMP_GT_OQ>(a, b)),
+    at least _mm256_blendv_ps(no, yes, _mm256_cmp_ps::<_CMP_GE_OQ>(a, b))
 );
 
 register!(
     /// Sixteen lanes of AVX-512.
     Avx512Lanes(__m512), 16 lanes,
-    _mm512_add_ps _mm512_sub_ps _mm512_mul_ps _mm512_div_ps _mm512_sqrt_ps _mm512_min_ps _mm512_max_ps _mm512_set1_ps,
-    |x, yes, no| _mm512_mask_blend_ps(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(_mm512_setzero_ps(), x), no, yes)
+    _mm512_add_ps _mm512_sub_ps _mm512_mul_ps _mm512_div_ps _mm512_sqrt_ps _mm512_min_ps _mm512_max_ps _mm512_set1_ps
+    avx512_andnot,
+    |a, b, yes, no| above _mm512_mask_blend_ps(_mm512_cmp_ps_mask::<_CMP_GT_OQ>(a, b), no, yes),
+    at least _mm512_mask_blend_ps(_mm512_cmp_ps_mask::<_CMP_GE_OQ>(a, b), no, yes)
 );
+
+/// `yes` where the mask is set, else `no`.
+///
+/// # Safety
+/// None: SSE2 is in every x86-64.
+#[inline(always)]
+unsafe fn sse2_select(mask: __m128, yes: __m128, no: __m128) -> __m128 {
+    // SAFETY: SSE2 is in every x86-64.
+    unsafe { _mm_or_ps(_mm_and_ps(mask, yes), _mm_andnot_ps(mask, no)) }
+}
+
+/// `!a & b`; AVX-512 F has it for integers only.
+///
+/// # Safety
+/// The machine must have AVX-512 F.
+#[inline(always)]
+unsafe fn avx512_andnot(a: __m512, b: __m512) -> __m512 {
+    // SAFETY: promised by the caller.
+    unsafe { _mm512_castsi512_ps(_mm512_andnot_si512(_mm512_castps_si512(a), _mm512_castps_si512(b))) }
+}
 
 /// # Safety
 /// None: SSE2 is in every x86-64.
