@@ -16,9 +16,7 @@ use super::filters::UserFilters;
 use super::pairs::Pair;
 use super::settings::WorldSettings;
 use super::shapes::ShapeSlot;
-use crate::arbiter::{
-    Arbiter, ArbiterKey, Contact, ContactData, EndReason, NONE, ONE_NORMAL, SLOTS, TANGENT_VELOCITY_OVERRIDDEN,
-};
+use crate::arbiter::{Arbiter, ArbiterKey, Contact, ContactData, NONE, ONE_NORMAL, SLOTS, TANGENT_VELOCITY_OVERRIDDEN};
 use crate::math::{Pose, Real, Rotation, Vec3, max, min};
 use crate::narrow_phase::{Manifold, collide};
 use crate::parallel::{Gather, SharedSlice};
@@ -86,7 +84,7 @@ impl World {
         }
         scratch.apart.sort_unstable();
         for pair in scratch.apart.drain(..) {
-            self.remove_pair(pair, EndReason::Separated);
+            self.part_pair(pair);
         }
         scratch.empty.retain(|&index| self.arbiters.at(index).alive);
         scratch.begins.sort_unstable_by_key(|begin| begin.0);

@@ -58,7 +58,7 @@ impl World {
     /// Fraction of the path at which a shape first comes within a slop of a static one; `limit` if it does not.
     fn first_impact(&self, mover: &Mover<'_>, limit: Real) -> Real {
         let mut first = limit;
-        self.broad_phase.query(&mover.swept_aabb(), |slot| {
+        self.broad_phase.query_static(&mover.swept_aabb(), |slot| {
             let other = &self.shapes[slot as usize];
             let body = &self.bodies[other.body as usize];
             if body.kind == BodyKind::Static && !other.sensor && mover.shape.filter.accepts(&other.filter) {
@@ -70,7 +70,6 @@ impl World {
                 };
                 first = min(impact.unwrap_or(limit), first);
             }
-            true
         });
         first
     }

@@ -86,6 +86,18 @@ impl Pair {
 impl World {
     /// Whether two shapes may have a pair at all.
     pub(crate) fn may_pair(&self, a: u32, b: u32) -> bool {
+        PairRules { shapes: &self.shapes, bodies: &self.bodies }.may_pair(a, b)
+    }
+}
+
+/// What decides whether two shapes may have a pair.
+pub(crate) struct PairRules<'a> {
+    pub shapes: &'a [super::shapes::ShapeSlot],
+    pub bodies: &'a [super::bodies::Body],
+}
+
+impl PairRules<'_> {
+    pub fn may_pair(&self, a: u32, b: u32) -> bool {
         let (shape_a, shape_b) = (&self.shapes[a as usize], &self.shapes[b as usize]);
         if shape_a.body == shape_b.body || !shape_a.filter.accepts(&shape_b.filter) {
             return false;
@@ -98,7 +110,9 @@ impl World {
             _ => kind_a != BodyKind::Static || kind_b != BodyKind::Static,
         }
     }
+}
 
+impl World {
     /// Makes a pair of two shapes that have none yet.
     pub(crate) fn add_pair(&mut self, a: u32, b: u32) {
         let smaller_first = self.shapes[a as usize].id < self.shapes[b as usize].id;
@@ -149,17 +163,30 @@ impl World {
 
     /// Ends a pair: its arbiter ends for `reason`, a sensor's overlap ends too.
     pub(crate) fn remove_pair(&mut self, index: u32, reason: EndReason) {
-        let pair = self.pairs[index as usize].clone();
-        if pair.arbiter != NONE {
-            self.end_arbiter(pair.arbiter, reason);
+        for slot in self.pairs[index as usize].shapes {
+            self.broad_phase.forget(slot);
         }
-        if pair.overlapping {
+        self.drop_pair(index, reason);
+    }
+
+    /// Ends a pair whose fat boxes did not overlap any more in this step's search: the broad phase knows.
+    pub(crate) fn part_pair(&mut self, index: u32) {
+        self.drop_pair(index, EndReason::Separated);
+    }
+
+    fn drop_pair(&mut self, index: u32, reason: EndReason) {
+        let pair = &self.pairs[index as usize];
+        let (shapes, arbiter, overlapping) = (pair.shapes, pair.arbiter, pair.overlapping);
+        if arbiter != NONE {
+            self.end_arbiter(arbiter, reason);
+        }
+        if overlapping {
             self.set_sensor_overlap(index, false);
         }
         self.deactivate_pair(index);
         self.unlink_pair(index, 0);
         self.unlink_pair(index, 1);
-        self.pair_set.remove(pair.shapes[0], pair.shapes[1]);
+        self.pair_set.remove(shapes[0], shapes[1]);
         self.pairs[index as usize].alive = false;
         self.free_pairs.push(index);
     }

@@ -2,22 +2,28 @@
 
 use super::World;
 use super::bodies::world_inverse_inertia;
+use super::pairs::PairRules;
 use super::timings::{Phase, PhaseClock};
 use crate::arbiter::{EndReason, NONE};
+use crate::broad_phase::Boxes;
 use crate::error::{Error, in_range};
 use crate::id::BodyId;
 use crate::math::{Aabb, Real, Vec3, min};
 use crate::parallel::{BlockList, Gather, SharedSlice};
 use crate::solver::{
-    IntegrateParameters, Pass, PassParameters, PrepareContext, Softness, StoreTarget, integrate_position,
-    integrate_velocity,
+    BodyMass, BodyMotion, BodyState, IntegrateParameters, Pass, PassParameters, PrepareContext, Softness, StoreTarget,
+    integrate_position, integrate_velocity,
 };
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Overlap of the most heavily loaded contact at rest, in slops. A light body under a heavy pile would sink deeper into its
 /// soft springs: to 3 cm, measured on 1,000 mixed bodies.
 const DEEPEST_REST: Real = 1.97;
 /// Bodies that a thread takes at a time.
 const BODIES_PER_BLOCK: usize = 128;
+
+/// Parts of the search for pairs for each thread: they differ in size.
+const PARTS_PER_THREAD: usize = 16;
 
 /// Stiffest spring of a contact, as a share of the substep rate: past it, tall stacks ring.
 const MAX_CONTACT_RATE: Real = 0.1875;
@@ -40,8 +46,6 @@ pub struct StepReport {
 /// What a body's finalizing has to tell.
 #[derive(Clone, Copy, Debug)]
 enum BodyNews {
-    /// The box of a shape has left its fat box.
-    Moved { shape: u32, tight: Aabb, fat: Aabb },
     /// The body may have passed through something.
     Fast(u32),
     /// The body went non-finite.
@@ -54,7 +58,13 @@ pub(crate) struct StepScratch {
     pairs: Vec<(u32, u32)>,
     may_break: Vec<bool>,
     news: Gather<BodyNews>,
+    /// Shapes whose boxes have left their fat boxes in this step, then all that have since the last narrow phase.
+    left: Gather<u32>,
     moved: Vec<u32>,
+    /// Whether a body has rested long enough to sleep.
+    pub any_rested: bool,
+    /// Pairs that several threads have found.
+    found: Gather<(u32, u32)>,
     /// Bodies that this step integrates.
     sorted_awake: Vec<u32>,
     /// Memory for the list with the woken ones.
@@ -118,14 +128,26 @@ impl World {
 
     /// Lists the awake bodies and turns gravity and their forces into this step's accelerations.
     fn apply_forces(&mut self) {
-        let mut list = std::mem::take(&mut self.scratch.sorted_awake);
-        list.clone_from(&self.awake);
-        list.sort_unstable();
-        for &index in &list {
-            self.accelerate(index);
+        if std::mem::take(&mut self.awake_changed) {
+            let list = &mut self.scratch.sorted_awake;
+            list.clone_from(&self.awake);
+            list.sort_unstable();
         }
-        self.scratch.sorted_awake = list;
-        self.awake_changed = false;
+        let awake = &self.scratch.sorted_awake;
+        let gravity = self.settings.gravity;
+        let bodies = SharedSlice::new(&mut self.bodies);
+        let states = SharedSlice::new(&mut self.solver_bodies.states);
+        let motions = SharedSlice::new(&mut self.solver_bodies.motions);
+        let masses = &self.solver_bodies.masses;
+        self.pool.run(awake.len().div_ceil(BODIES_PER_BLOCK), |block| {
+            for &body in block_of(awake, block) {
+                let index = body as usize;
+                // SAFETY: a body stands in the list once.
+                let (body, state, motion) =
+                    unsafe { (bodies.get_mut(index), states.get_mut(index), motions.get_mut(index)) };
+                accelerate(body, (state, motion, &masses[index]), gravity);
+            }
+        });
     }
 
     /// Lets bodies that contacts have woken take part in the step in full, and drops those that listeners have removed. What
@@ -139,34 +161,23 @@ impl World {
         list.sort_unstable();
         for &index in &list {
             if self.scratch.sorted_awake.binary_search(&index).is_err() {
-                self.accelerate(index);
+                let at = index as usize;
+                let solver = &mut self.solver_bodies;
+                let records = (&mut solver.states[at], &mut solver.motions[at], &solver.masses[at]);
+                accelerate(&mut self.bodies[at], records, self.settings.gravity);
             }
         }
         std::mem::swap(&mut list, &mut self.scratch.sorted_awake);
         self.scratch.admitted = list;
     }
 
-    /// Turns gravity and the forces on a body into its accelerations, and starts its motion of this step at zero.
-    fn accelerate(&mut self, index: u32) {
-        let body = &mut self.bodies[index as usize];
-        let motion = &mut self.solver_bodies.motions[index as usize];
-        let mass = &self.solver_bodies.masses[index as usize];
-        let (free, _) = body.locked_axes.free();
-        let dynamic = !motion.kinematic && !body.frozen;
-        let gravity = self.settings.gravity * body.gravity_scale * free;
-        motion.acceleration = if dynamic { gravity + mass.inverse_mass * body.force } else { Vec3::ZERO };
-        motion.angular_acceleration = if dynamic { mass.inverse_inertia.mul(body.torque) } else { Vec3::ZERO };
-        (body.force, body.torque) = (Vec3::ZERO, Vec3::ZERO);
-        let state = &mut self.solver_bodies.states[index as usize];
-        (state.translation, state.turn, state.constrained) = (Vec3::ZERO, Vec3::ZERO, 0);
-    }
-
     /// Finds the pairs of shapes that have moved.
     fn find_pairs(&mut self) {
+        if !self.broad_phase.has_moved() {
+            return;
+        }
         let mut found = std::mem::take(&mut self.scratch.pairs);
-        let mut broad_phase = std::mem::take(&mut self.broad_phase);
-        broad_phase.find_pairs(|a, b| !self.pair_set.contains(a, b) && self.may_pair(a, b), &mut found);
-        self.broad_phase = broad_phase;
+        self.search_pairs(&mut found);
         for &(a, b) in &found {
             if self.passes_pair_filter(a, b) {
                 self.add_pair(a, b);
@@ -174,6 +185,29 @@ impl World {
         }
         found.clear();
         self.scratch.pairs = found;
+    }
+
+    /// The pairs that are new, sorted.
+    fn search_pairs(&mut self, found: &mut Vec<(u32, u32)>) {
+        let rules = PairRules { shapes: &self.shapes, bodies: &self.bodies };
+        // A filter of the user's own may have changed its mind about a pair that it has rejected.
+        let (pair_set, trust) = (&self.pair_set, self.filters.pair.is_none());
+        let is_new = |a: u32, b: u32, known: bool| !(known && trust || pair_set.contains(a, b)) && rules.may_pair(a, b);
+        let threads = self.pool.threads();
+        if threads == 1 {
+            self.broad_phase.find_pairs(is_new, found);
+            return;
+        }
+        self.scratch.found.prepare(threads, BODIES_PER_BLOCK);
+        self.broad_phase.prepare(PARTS_PER_THREAD * threads);
+        let (broad_phase, gather) = (&self.broad_phase, &self.scratch.found);
+        let work = broad_phase.work();
+        self.pool.run(work.len(), |block| {
+            let mut list = gather.block();
+            broad_phase.pairs_of(&work[block], is_new, |a, b| list.push((a, b)));
+        });
+        found.append(self.scratch.found.list());
+        self.broad_phase.finish(found);
     }
 
     fn call_providers(&mut self) {
@@ -289,15 +323,19 @@ impl World {
     /// New poses, boxes and rest times; then continuous collision for the fast.
     fn finalize(&mut self, dt: Real, report: &mut StepReport) {
         let mut gather = std::mem::take(&mut self.scratch.news);
+        let mut left = std::mem::take(&mut self.scratch.left);
         gather.prepare(self.pool.threads(), BODIES_PER_BLOCK);
-        self.finalize_bodies(dt, &gather);
+        left.prepare(self.pool.threads(), BODIES_PER_BLOCK);
+        self.finalize_bodies(dt, &gather, &left);
+        // Before the fast: a body that is stopped short moves its boxes back. In any order: the tree comes out the same.
+        self.broad_phase.lift(left.list());
+        self.scratch.moved.append(left.list());
+        self.scratch.left = left;
         let news = gather.list();
-        // Threads report in any order; the trees and the report must not depend on it.
+        // Threads report in any order; the report must not depend on it.
         news.sort_unstable_by_key(|item| match *item {
             BodyNews::Broken(body) => (0, body),
-            // Before the fast: a body that is stopped short moves its boxes back.
-            BodyNews::Moved { shape, .. } => (1, shape),
-            BodyNews::Fast(body) => (2, body),
+            BodyNews::Fast(body) => (1, body),
         });
         for item in news.drain(..) {
             match item {
@@ -306,35 +344,41 @@ impl World {
                     report.frozen.push(self.body_id(body));
                 }
                 BodyNews::Fast(body) => self.stop_at_impact(body),
-                BodyNews::Moved { shape, tight, fat } => {
-                    if self.broad_phase.update(shape, &tight, &fat) {
-                        self.moved_shapes[shape as usize] = true;
-                        self.scratch.moved.push(shape);
-                    }
-                }
             }
         }
         self.scratch.news = gather;
     }
 
-    fn finalize_bodies(&mut self, dt: Real, news: &Gather<BodyNews>) {
+    fn finalize_bodies(&mut self, dt: Real, news: &Gather<BodyNews>, left: &Gather<u32>) {
         let awake = &self.scratch.sorted_awake;
-        let world =
-            FinalizeContext { shapes: &self.shapes, broad_phase: &self.broad_phase, settings: &self.scaled, dt };
+        let world = FinalizeContext {
+            shapes: &self.shapes,
+            boxes: self.broad_phase.boxes(),
+            moved: SharedSlice::new(&mut self.moved_shapes),
+            settings: &self.scaled,
+            dt,
+        };
+        let rested = AtomicBool::new(false);
         let bodies = SharedSlice::new(&mut self.bodies);
         let states = SharedSlice::new(&mut self.solver_bodies.states);
         let motions = SharedSlice::new(&mut self.solver_bodies.motions);
         let masses = SharedSlice::new(&mut self.solver_bodies.masses);
         self.pool.run(awake.len().div_ceil(BODIES_PER_BLOCK), |block| {
-            let mut found = news.block();
+            let mut found = (news.block(), left.block());
+            let mut any_rested = false;
             for &index in block_of(awake, block) {
                 let at = index as usize;
                 // SAFETY: a body stands in the list once.
                 let (body, state, motion, mass) =
                     unsafe { (bodies.get_mut(at), states.get_mut(at), motions.get_mut(at), masses.get_mut(at)) };
                 world.finalize_body(index, (body, state, motion, mass), &mut found);
+                any_rested |= body.sleep_time >= world.settings.time_to_sleep;
+            }
+            if any_rested {
+                rested.store(true, Ordering::Relaxed);
             }
         });
+        self.scratch.any_rested = rested.into_inner();
     }
 
     /// Puts a body that went non-finite back to its last finite pose and stops it.
@@ -396,7 +440,9 @@ fn block_of(awake: &[u32], block: usize) -> &[u32] {
 /// What finalizing a body reads.
 struct FinalizeContext<'a> {
     shapes: &'a [super::shapes::ShapeSlot],
-    broad_phase: &'a crate::broad_phase::BroadPhase,
+    boxes: Boxes<'a>,
+    /// By shape: whether its proxy has moved.
+    moved: SharedSlice<'a, bool>,
     settings: &'a super::WorldSettings,
     dt: Real,
 }
@@ -405,13 +451,8 @@ impl FinalizeContext<'_> {
     fn finalize_body(
         &self,
         index: u32,
-        (body, state, motion, mass): (
-            &mut super::bodies::Body,
-            &mut crate::solver::BodyState,
-            &mut crate::solver::BodyMotion,
-            &mut crate::solver::BodyMass,
-        ),
-        news: &mut BlockList<'_, BodyNews>,
+        (body, state, motion, mass): (&mut super::bodies::Body, &mut BodyState, &mut BodyMotion, &mut BodyMass),
+        (news, left): &mut (BlockList<'_, BodyNews>, BlockList<'_, u32>),
     ) {
         let center = mass.center + state.translation;
         let finite = center.is_finite()
@@ -433,24 +474,28 @@ impl FinalizeContext<'_> {
         let rests = if motion.kinematic { speed == 0.0 } else { body.can_sleep && speed < self.settings.sleep_speed };
         body.sleep_time = if rests { body.sleep_time + self.dt } else { 0.0 };
         let traveled = state.translation.length() + state.turn.length() * (body.reach - body.inner_radius);
-        if self.settings.continuous && body.continuous && !motion.kinematic && traveled > 0.5 * body.inner_radius {
+        let fast = self.settings.continuous && body.continuous && !motion.kinematic;
+        if fast && traveled > 0.5 * body.inner_radius && self.meets_static(body, center, state.translation) {
             news.push(BodyNews::Fast(index));
         }
         let displacement = state.linear_velocity * self.dt;
         for &slot in &body.shape_slots {
-            self.update_box(slot, body, displacement, news);
+            self.update_box(slot, body, displacement, left);
         }
+    }
+
+    /// Whether a body may have met a static shape on its way.
+    ///
+    /// In continuous collision a shape turns about its own middle, which goes straight. So no point comes farther from the way
+    /// of the centre of mass than three times the reach: once from there to that middle, twice across the body.
+    fn meets_static(&self, body: &super::bodies::Body, center: Vec3, translation: Vec3) -> bool {
+        let way = Aabb::from_points([center - translation, center]);
+        self.boxes.meets_static(&way.expand(3.0 * body.reach + self.settings.speculative_distance))
     }
 
     /// Reports a shape whose box has left its fat box. Boxes of fast shapes reach ahead, so that what they will touch within
     /// the next step is found now.
-    fn update_box(
-        &self,
-        slot: u32,
-        body: &super::bodies::Body,
-        displacement: Vec3,
-        news: &mut BlockList<'_, BodyNews>,
-    ) {
+    fn update_box(&self, slot: u32, body: &super::bodies::Body, displacement: Vec3, left: &mut BlockList<'_, u32>) {
         let shape = &self.shapes[slot as usize];
         let tight = shape.geometry.aabb(&body.pose.mul(&shape.pose));
         let speculative = self.settings.speculative_distance;
@@ -460,9 +505,27 @@ impl FinalizeContext<'_> {
             if ahead > speculative { displacement * (min(ahead, size + speculative) / ahead) } else { Vec3::ZERO };
         let tight = tight.sweep(reach);
         let near = tight.expand(speculative);
-        if self.broad_phase.fat_aabb(slot).is_some_and(|fat| !fat.contains(&near)) {
-            let creep = min(0.125 * shape.geometry.local_aabb().half_extents().length(), 2.5 * speculative);
-            news.push(BodyNews::Moved { shape: slot, tight: near, fat: near.expand(creep) });
+        let fat = || near.expand(min(0.125 * shape.geometry.local_aabb().half_extents().length(), 2.5 * speculative));
+        // SAFETY: a shape belongs to one body, which stands in the list of bodies once.
+        if unsafe { self.boxes.update(slot, &near, fat) } {
+            left.push(slot);
+            // SAFETY: as above.
+            unsafe { *self.moved.get_mut(slot as usize) = true };
         }
     }
+}
+
+/// Turns gravity and the forces on a body into its accelerations, and starts its motion of this step at zero.
+fn accelerate(
+    body: &mut super::bodies::Body,
+    (state, motion, mass): (&mut BodyState, &mut BodyMotion, &BodyMass),
+    gravity: Vec3,
+) {
+    let (free, _) = body.locked_axes.free();
+    let dynamic = !motion.kinematic && !body.frozen;
+    let gravity = gravity * body.gravity_scale * free;
+    motion.acceleration = if dynamic { gravity + mass.inverse_mass * body.force } else { Vec3::ZERO };
+    motion.angular_acceleration = if dynamic { mass.inverse_inertia.mul(body.torque) } else { Vec3::ZERO };
+    (body.force, body.torque) = (Vec3::ZERO, Vec3::ZERO);
+    (state.translation, state.turn, state.constrained) = (Vec3::ZERO, Vec3::ZERO, 0);
 }
