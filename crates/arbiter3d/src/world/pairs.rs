@@ -2,7 +2,8 @@
 //!
 //! A pair remembers what the narrow phase may use again: its arbiter, the last separating feature, and the relative pose at
 //! the last full manifold. The pairs of a body hang on a doubly linked list through the records; those with an awake body
-//! stand in `active_pairs`.
+//! stand in `active_pairs`, listed in the order of their places: the narrow phase walks them through memory in one direction,
+//! whatever has come and gone.
 
 use super::World;
 use super::definition::BodyKind;
@@ -17,9 +18,9 @@ pub(crate) struct Pair {
     pub bodies: [u32; 2],
     /// `NONE` while the shapes do not touch.
     pub arbiter: u32,
-    /// Place among the active pairs; `NONE` while both bodies rest.
-    pub active_place: u32,
     pub alive: bool,
+    /// Whether a body of the two is awake.
+    pub active: bool,
     pub sensor: bool,
     /// Whether a surface of the two moves along itself: its direction turns with its body.
     pub conveyor: bool,
@@ -83,6 +84,51 @@ impl Pair {
     }
 }
 
+/// A set of places, listed in order when asked for: one bit a place.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct PlaceSet {
+    bits: Vec<u64>,
+    list: Vec<u32>,
+    /// Whether the list is out of date.
+    changed: bool,
+}
+
+impl PlaceSet {
+    pub fn insert(&mut self, place: u32) {
+        let word = place as usize / 64;
+        if self.bits.len() <= word {
+            self.bits.resize(word + 1, 0);
+        }
+        self.bits[word] |= 1 << (place % 64);
+        self.changed = true;
+    }
+
+    pub fn remove(&mut self, place: u32) {
+        self.bits[place as usize / 64] &= !(1 << (place % 64));
+        self.changed = true;
+    }
+
+    /// Brings the list up to date.
+    pub fn refresh(&mut self) {
+        if !std::mem::take(&mut self.changed) {
+            return;
+        }
+        self.list.clear();
+        for (word, &bits) in self.bits.iter().enumerate() {
+            let mut rest = bits;
+            while rest != 0 {
+                self.list.push(word as u32 * 64 + rest.trailing_zeros());
+                rest &= rest - 1;
+            }
+        }
+    }
+
+    /// The places as of the last [`PlaceSet::refresh`], smallest first.
+    pub fn list(&self) -> &[u32] {
+        &self.list
+    }
+}
+
 impl World {
     /// Whether two shapes may have a pair at all.
     pub(crate) fn may_pair(&self, a: u32, b: u32) -> bool {
@@ -123,8 +169,8 @@ impl World {
             shapes,
             bodies,
             arbiter: NONE,
-            active_place: NONE,
             alive: true,
+            active: false,
             sensor: shapes.iter().any(|&slot| self.shapes[slot as usize].sensor),
             conveyor: shapes.iter().any(|&slot| self.shapes[slot as usize].material.tangent_velocity != Vec3::ZERO),
             overlapping: false,
@@ -205,19 +251,13 @@ impl World {
     }
 
     pub(crate) fn activate_pair(&mut self, index: u32) {
-        if self.pairs[index as usize].active_place == NONE {
-            self.pairs[index as usize].active_place = self.active_pairs.len() as u32;
-            self.active_pairs.push(index);
-        }
+        self.pairs[index as usize].active = true;
+        self.active_pairs.insert(index);
     }
 
     pub(crate) fn deactivate_pair(&mut self, index: u32) {
-        let place = std::mem::replace(&mut self.pairs[index as usize].active_place, NONE);
-        if place != NONE {
-            self.active_pairs.swap_remove(place as usize);
-            if let Some(&moved) = self.active_pairs.get(place as usize) {
-                self.pairs[moved as usize].active_place = place;
-            }
+        if std::mem::take(&mut self.pairs[index as usize].active) {
+            self.active_pairs.remove(index);
         }
     }
 

@@ -2,6 +2,7 @@
 
 use super::World;
 use super::bodies::world_inverse_inertia;
+use super::collide::shapes_overlap;
 use super::pairs::PairRules;
 use super::timings::{Phase, PhaseClock};
 use crate::arbiter::{EndReason, NONE};
@@ -22,8 +23,15 @@ const DEEPEST_REST: Real = 1.97;
 /// Bodies that a thread takes at a time.
 const BODIES_PER_BLOCK: usize = 128;
 
+/// Rows whose contacts a thread looks at at a time.
+const ROWS_PER_BLOCK: usize = 512;
+/// Arbiters without contacts that a thread looks at at a time.
+const EMPTY_PER_BLOCK: usize = 16;
 /// Parts of the search for pairs for each thread: they differ in size.
 const PARTS_PER_THREAD: usize = 16;
+
+/// Awake bodies, pairs and arbiters from which on a step uses several threads: below, waiting for each other costs more.
+const WORK_FOR_THREADS: usize = 1500;
 
 /// Stiffest spring of a contact, as a share of the substep rate: past it, tall stacks ring.
 const MAX_CONTACT_RATE: Real = 0.1875;
@@ -61,6 +69,9 @@ pub(crate) struct StepScratch {
     /// Shapes whose boxes have left their fat boxes in this step, then all that have since the last narrow phase.
     left: Gather<u32>,
     moved: Vec<u32>,
+    /// Arbiters that have lost their last contact, then whether they end.
+    broken: Gather<u32>,
+    over: Vec<bool>,
     /// Whether a body has rested long enough to sleep.
     pub any_rested: bool,
     /// Pairs that several threads have found.
@@ -91,6 +102,8 @@ impl World {
         }
         self.dt = dt;
         let mut clock = PhaseClock::start();
+        let work = self.awake.len() + self.active_pairs.list().len() + self.arbiters.order().len();
+        self.pool.begin_step(work >= WORK_FOR_THREADS);
         self.events.begin_step();
         self.flush_events();
         self.apply_forces();
@@ -117,6 +130,7 @@ impl World {
         clock.mark(Phase::EndEvents);
         self.sleep_islands();
         self.events.end_step();
+        self.pool.end_step();
         clock.mark(Phase::Sleep);
         self.timings = clock.finish();
         #[cfg(debug_assertions)]
@@ -193,7 +207,7 @@ impl World {
         // A filter of the user's own may have changed its mind about a pair that it has rejected.
         let (pair_set, trust) = (&self.pair_set, self.filters.pair.is_none());
         let is_new = |a: u32, b: u32, known: bool| !(known && trust || pair_set.contains(a, b)) && rules.may_pair(a, b);
-        let threads = self.pool.threads();
+        let threads = self.pool.active_threads();
         if threads == 1 {
             self.broad_phase.find_pairs(is_new, found);
             return;
@@ -394,17 +408,7 @@ impl World {
     /// Drops contacts past the break distance and ends arbiters that have none left and whose shapes do not overlap.
     fn end_broken(&mut self) {
         let mut empty = std::mem::take(&mut self.narrow.empty);
-        let may_break = std::mem::take(&mut self.scratch.may_break);
-        for (row, _) in self.plan.rows.iter().zip(&may_break).filter(|(_, may_break)| **may_break) {
-            let arbiter = self.arbiters.at_mut(row.arbiter);
-            let [pose1, pose2] =
-                [arbiter.body1, arbiter.body2].map(|body| self.solver_bodies.masses[body.index as usize].pose());
-            arbiter.data.break_contacts(&pose1, &pose2, self.scaled.contact_break_distance);
-            if arbiter.data.usage_mask & 15 == 0 {
-                empty.push(row.arbiter);
-            }
-        }
-        self.scratch.may_break = may_break;
+        self.break_contacts(&mut empty);
         let custom = if self.arbiters.custom > 0 { self.arbiters.order() } else { &[] };
         for &(_, index) in custom {
             let arbiter = self.arbiters.at(index);
@@ -414,20 +418,64 @@ impl World {
         }
         empty.sort_unstable();
         empty.dedup();
-        for &index in &empty {
-            let arbiter = self.arbiters.at(index);
-            if !arbiter.alive || arbiter.data.usage_mask & 15 != 0 {
-                continue;
-            }
-            let pair = arbiter.pair;
-            if pair == NONE || !self.pair_overlaps(pair) {
-                self.end_arbiter(index, EndReason::Separated);
-            } else {
-                self.pairs[pair as usize].has_manifold = false;
-            }
+        self.keep_overlapping(&mut empty);
+        for index in empty.drain(..) {
+            self.end_arbiter(index, EndReason::Separated);
         }
-        empty.clear();
         self.narrow.empty = empty;
+    }
+
+    /// Drops contacts past the break distance; arbiters that have none left are appended to `empty`, in no particular order.
+    fn break_contacts(&mut self, empty: &mut Vec<u32>) {
+        self.scratch.broken.prepare(self.pool.threads(), BODIES_PER_BLOCK);
+        let (rows, may_break) = (&self.plan.rows, &self.scratch.may_break);
+        let (broken, masses) = (&self.scratch.broken, &self.solver_bodies.masses);
+        let break_distance = self.scaled.contact_break_distance;
+        let arbiters = SharedSlice::new(self.arbiters.slots_mut());
+        self.pool.run(rows.len().div_ceil(ROWS_PER_BLOCK), |block| {
+            let mut found = broken.block();
+            let range = block * ROWS_PER_BLOCK..((block + 1) * ROWS_PER_BLOCK).min(rows.len());
+            for (row, _) in rows[range.clone()].iter().zip(&may_break[range]).filter(|(_, may_break)| **may_break) {
+                // SAFETY: an arbiter has one row.
+                let arbiter = unsafe { arbiters.get_mut(row.arbiter as usize) };
+                let [pose1, pose2] = [arbiter.body1, arbiter.body2].map(|body| masses[body.index as usize].pose());
+                arbiter.data.break_contacts(&pose1, &pose2, break_distance);
+                if arbiter.data.usage_mask & 15 == 0 {
+                    found.push(row.arbiter);
+                }
+            }
+        });
+        empty.append(self.scratch.broken.list());
+    }
+
+    /// Takes out of a list of arbiters without contacts those that go on: their shapes overlap, or they are gone already.
+    fn keep_overlapping(&mut self, empty: &mut Vec<u32>) {
+        let mut over = std::mem::take(&mut self.scratch.over);
+        over.clear();
+        over.resize(empty.len(), false);
+        let (arbiters, pairs, shapes, bodies) = (&self.arbiters, &self.pairs, &self.shapes, &self.bodies);
+        let (list, flags) = (&*empty, SharedSlice::new(&mut over));
+        self.pool.run(list.len().div_ceil(EMPTY_PER_BLOCK), |block| {
+            let first = block * EMPTY_PER_BLOCK;
+            for (at, &index) in list.iter().enumerate().skip(first).take(EMPTY_PER_BLOCK) {
+                let arbiter = arbiters.at(index);
+                let without = arbiter.alive && arbiter.data.usage_mask & 15 == 0;
+                let ends =
+                    without && (arbiter.pair == NONE || !shapes_overlap(&pairs[arbiter.pair as usize], shapes, bodies));
+                // SAFETY: each place belongs to one block.
+                unsafe { *flags.get_mut(at) = ends };
+            }
+        });
+        let mut flags = over.iter();
+        empty.retain(|&index| {
+            let ends = *flags.next().unwrap_or(&false);
+            let arbiter = self.arbiters.at(index);
+            if !ends && arbiter.alive && arbiter.pair != NONE && arbiter.data.usage_mask & 15 == 0 {
+                self.pairs[arbiter.pair as usize].has_manifold = false;
+            }
+            ends
+        });
+        self.scratch.over = over;
     }
 }
 
