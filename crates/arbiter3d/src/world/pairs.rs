@@ -285,3 +285,30 @@ impl World {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::PlaceSet;
+    use std::collections::BTreeSet;
+
+    /// 2,000 random edits over 300 places: the list is that of a sorted set, however often a place comes and goes.
+    #[test]
+    fn places_are_listed_in_order_whatever_came_and_went() {
+        let (mut set, mut model) = (PlaceSet::default(), BTreeSet::new());
+        let mut state = 3_u64;
+        for edit in 0..2_000 {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            let place = (state >> 33) as u32 % 300;
+            if model.remove(&place) {
+                set.remove(place);
+            } else {
+                model.insert(place);
+                set.insert(place);
+            }
+            if edit % 7 == 0 {
+                set.refresh();
+                assert_eq!(set.list(), model.iter().copied().collect::<Vec<_>>());
+            }
+        }
+    }
+}
