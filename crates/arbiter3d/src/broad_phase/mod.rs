@@ -4,11 +4,16 @@
 //! leaf's box is *fat*: larger than the shape by a margin, so that a shape that creeps or jitters changes nothing. Only when
 //! the tight box leaves the fat one is the proxy moved and marked, and only pairs with a marked proxy are looked for.
 //!
-//! A step is: [`BroadPhase::update`] for each moved shape, then [`BroadPhase::find_pairs`]. To spread the search over
-//! threads, call its three parts instead: [`BroadPhase::prepare`], which also cuts the work into independent parts,
-//! [`BroadPhase::pairs_of`] for each part with buffers of the thread's own, and [`BroadPhase::finish`] with all that was
-//! found. The result is sorted, so it does not depend on how the work was cut or who did it. Nothing is ever dropped: all
-//! buffers grow.
+//! A step is: [`BroadPhase::update`] for each moved shape, then [`BroadPhase::find_pairs`]. To spread the work over
+//! threads, let them write boxes with [`Boxes::update`] and call [`BroadPhase::lift`] with the shapes of which it said that
+//! they have moved; and call the three parts of the search: [`BroadPhase::prepare`], which also cuts the work into
+//! independent parts, [`BroadPhase::pairs_of`] for each part with buffers of the thread's own, and [`BroadPhase::finish`] with
+//! all that was found. The result is sorted, so it does not depend on how the work was cut or who did it. Nothing is ever
+//! dropped: all buffers grow.
+//!
+//! A search meets the pairs that are known already again and again. Most are told from new ones without looking them up: the
+//! boxes of both shapes overlapped in the last search too. A caller that drops a pair although its boxes overlap says so with
+//! [`BroadPhase::forget`].
 //!
 //! Keeping the trees good: marked boxes are refitted each step, every [`REBUILD_INTERVAL`]th search rebuilds what has
 //! moved since the last rebuild, and a tree that many shapes were added to is built anew.
@@ -20,8 +25,9 @@ pub use pair_set::PairSet;
 pub use tree::DynamicTree;
 
 use crate::math::{Aabb, Real, Vec3};
+use crate::parallel::SharedSlice;
 use pair_set::pair_key;
-use tree::{LinkPair, PairSearch};
+use tree::{Leaf, LinkPair, PairSearch};
 
 /// Searches from one rebuild of what has moved to the next.
 ///
@@ -56,10 +62,42 @@ pub struct PairWork {
     between: bool,
 }
 
-/// Memory of one thread's search.
-#[derive(Clone, Debug, Default)]
-pub struct PairScratch {
-    stack: Vec<LinkPair>,
+/// The boxes of all shapes while threads move them.
+pub struct Boxes<'a> {
+    proxies: &'a [Proxy],
+    fixed: &'a DynamicTree,
+    moving: SharedSlice<'a, Leaf>,
+}
+
+impl Boxes<'_> {
+    /// Whether a static shape's fat box overlaps `aabb`.
+    pub fn meets_static(&self, aabb: &Aabb) -> bool {
+        let mut meets = false;
+        self.fixed.query(aabb, |_| {
+            meets = true;
+            false
+        });
+        meets
+    }
+
+    /// Gives a shape of a moving body the box `fat` if the `tight` box has left its old one, and tells whether that was so.
+    ///
+    /// # Safety
+    /// No other thread may update the same shape at the same time.
+    #[inline(always)]
+    pub unsafe fn update(&self, shape: u32, tight: &Aabb, fat: impl FnOnce() -> Aabb) -> bool {
+        let Some(&Proxy { leaf, kind: TreeKind::Moving }) = self.proxies.get(shape as usize) else { return false };
+        if leaf == NO_LEAF {
+            return false;
+        }
+        // SAFETY: a leaf belongs to one shape, and the caller promises that no one else is at this one.
+        let leaf = unsafe { self.moving.get_mut(leaf as usize) };
+        let left = !leaf.aabb.contains(tight);
+        if left {
+            leaf.aabb = fat();
+        }
+        left
+    }
 }
 
 /// The boxes of all shapes, by shape index.
@@ -68,9 +106,12 @@ pub struct BroadPhase {
     fixed: DynamicTree,
     moving: DynamicTree,
     proxies: Vec<Proxy>,
+    /// By leaf of the moving tree: its box in the last search; empty if it was not there, or a pair of it was dropped.
+    seen: Vec<Aabb>,
     searches: u32,
+    /// Kept for their memory.
     work: Vec<PairWork>,
-    scratch: PairScratch,
+    links: Vec<LinkPair>,
 }
 
 impl BroadPhase {
@@ -94,6 +135,12 @@ impl BroadPhase {
         let tree = self.tree_mut(kind);
         let leaf = tree.insert(fat, shape);
         tree.mark(leaf);
+        if kind == TreeKind::Moving {
+            if self.seen.len() <= leaf as usize {
+                self.seen.resize(leaf as usize + 1, Aabb::EMPTY);
+            }
+            self.seen[leaf as usize] = Aabb::EMPTY;
+        }
         self.proxies[index] = Proxy { leaf, kind };
     }
 
@@ -116,10 +163,30 @@ impl BroadPhase {
         true
     }
 
+    /// The boxes of all shapes, for several threads to move.
+    pub fn boxes(&mut self) -> Boxes<'_> {
+        Boxes { proxies: &self.proxies, fixed: &self.fixed, moving: SharedSlice::new(self.moving.leaves_mut()) }
+    }
+
+    /// Brings the tree up to date with what [`Boxes::update`] has moved: `moved` are the shapes, in any order.
+    pub fn lift(&mut self, moved: &[u32]) {
+        let leaves = moved.iter().map(|&shape| self.proxies[shape as usize].leaf);
+        self.moving.lift_leaves(leaves);
+    }
+
     /// Has the next search find the pairs of a shape anew, though it has not moved: its filter has changed, say.
     pub fn touch(&mut self, shape: u32) {
         if let Some(proxy) = self.proxy(shape) {
             self.tree_mut(proxy.kind).mark(proxy.leaf);
+        }
+        self.forget(shape);
+    }
+
+    /// A pair of the shape is dropped by other means than its boxes' parting: the next search in which the two meet with a
+    /// mark does not call them known.
+    pub fn forget(&mut self, shape: u32) {
+        if let Some(Proxy { leaf, kind: TreeKind::Moving }) = self.proxy(shape) {
+            self.seen[leaf as usize] = Aabb::EMPTY;
         }
     }
 
@@ -139,22 +206,19 @@ impl BroadPhase {
     /// Finds all pairs of shapes with overlapping fat boxes of which one has moved since the last search, which `filter`
     /// lets pass; not those of two static shapes. `out` is overwritten: smaller shape first, sorted, each pair once.
     ///
-    /// A filter that rejects the pairs known already makes the result the new pairs.
-    pub fn find_pairs(&mut self, filter: impl Fn(u32, u32) -> bool, out: &mut Vec<(u32, u32)>) {
-        let mut work = std::mem::take(&mut self.work);
-        self.prepare(1, &mut work);
-        let mut scratch = std::mem::take(&mut self.scratch);
+    /// The filter is also told whether the pair is known: it has been met by an earlier search, and its boxes have overlapped
+    /// ever since. One that rejects the pairs that the caller has already makes the result the new pairs.
+    pub fn find_pairs(&mut self, filter: impl Fn(u32, u32, bool) -> bool, out: &mut Vec<(u32, u32)>) {
         out.clear();
-        for part in &work {
-            self.pairs_of(part, &filter, &mut scratch, out);
+        self.prepare(1);
+        for part in self.work() {
+            self.pairs_of(part, &filter, |a, b| out.push((a, b)));
         }
-        self.work = work;
-        self.scratch = scratch;
         self.finish(out);
     }
 
     /// Tightens the trees and cuts the search into about `parts` independent parts a pair of trees.
-    pub fn prepare(&mut self, parts: usize, work: &mut Vec<PairWork>) {
+    pub fn prepare(&mut self, parts: usize) {
         self.searches = self.searches.wrapping_add(1);
         let rebuild = self.searches.is_multiple_of(REBUILD_INTERVAL);
         for tree in [&mut self.fixed, &mut self.moving] {
@@ -166,37 +230,56 @@ impl BroadPhase {
                 tree.refit_marked();
             }
         }
+        let (mut work, mut links) = (std::mem::take(&mut self.work), std::mem::take(&mut self.links));
         work.clear();
-        let mut links = std::mem::take(&mut self.scratch.stack);
         for between in [false, true] {
             self.search(between).split(parts, &mut links);
             work.extend(links.iter().map(|&links| PairWork { links, between }));
         }
-        links.clear();
-        self.scratch.stack = links;
+        (self.work, self.links) = (work, links);
     }
 
-    /// Appends the pairs of one part of the work, in no particular order.
-    pub fn pairs_of(
-        &self,
-        part: &PairWork,
-        filter: impl Fn(u32, u32) -> bool,
-        scratch: &mut PairScratch,
-        out: &mut Vec<(u32, u32)>,
-    ) {
-        self.search(part.between).run(part.links, &mut scratch.stack, |a, b| {
+    /// The parts of the search prepared.
+    pub fn work(&self) -> &[PairWork] {
+        &self.work
+    }
+
+    /// Calls `emit` with the pairs of one part of the work, in no particular order.
+    pub fn pairs_of(&self, part: &PairWork, filter: impl Fn(u32, u32, bool) -> bool, mut emit: impl FnMut(u32, u32)) {
+        let second = if part.between { &self.fixed } else { &self.moving };
+        self.search(part.between).run(part.links, |left, right| {
+            let before = &self.seen[left.index()];
+            let known = if part.between {
+                !right.is_marked() && before.overlaps(second.aabb(right.index() as u32))
+            } else {
+                before.overlaps(&self.seen[right.index()])
+            };
+            let (a, b) = (self.moving.data(left.index() as u32), second.data(right.index() as u32));
             let pair = if a < b { (a, b) } else { (b, a) };
-            if filter(pair.0, pair.1) {
-                out.push(pair);
+            if filter(pair.0, pair.1, known) {
+                emit(pair.0, pair.1);
             }
         });
+    }
+
+    /// Whether the next search has something to do.
+    pub fn has_moved(&self) -> bool {
+        self.moving.has_marks() || self.fixed.has_marks()
     }
 
     /// Sorts what all parts have found and forgets what has moved.
     pub fn finish(&mut self, out: &mut [(u32, u32)]) {
         out.sort_unstable_by_key(|&(a, b)| pair_key(a, b));
-        self.fixed.clear_marks();
-        self.moving.clear_marks();
+        self.fixed.clear_marks(|_, _| ());
+        self.moving.clear_marks(|leaf, aabb| self.seen[leaf] = *aabb);
+    }
+
+    /// Calls `visit` with each static shape whose fat box overlaps `aabb`.
+    pub fn query_static(&self, aabb: &Aabb, mut visit: impl FnMut(u32)) {
+        self.fixed.query(aabb, |shape| {
+            visit(shape);
+            true
+        });
     }
 
     /// Calls `visit` with each shape whose fat box overlaps `aabb`, static ones first, until it returns `false`.

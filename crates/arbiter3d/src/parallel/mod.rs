@@ -4,8 +4,9 @@
 //! counter, and the caller returns when all blocks are done: `run` is a barrier. Which thread takes which block is left to
 //! chance, so a stage may only write what belongs to its block; then results do not depend on the number of threads.
 //!
-//! Workers spin for a moment after a stage, since the next one is a microsecond away within a step, then sleep on a
-//! condition variable. With one thread the pool is a plain loop. Source of the scheme: the stage scheduler of
+//! Within a step the next stage is microseconds away: [`StagePool::begin_step`] wakes the workers, and they look for stages
+//! until the step ends. Between steps they soon sleep on a condition variable. With one thread, and in a step with too little
+//! to do for several, the pool is a plain loop. Source of the scheme: the stage scheduler of
 //! BepuPhysics 2 and Box2D 3.
 
 mod gather;
@@ -18,8 +19,12 @@ use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, AtomicUsize, Ordering}
 use std::sync::{Arc, Condvar, Mutex};
 use std::thread::JoinHandle;
 
-/// How many times an idle worker looks for the next stage before it sleeps; about 50 µs.
+/// How many times an idle worker looks for the next stage before it sleeps, or within a step gives way to other programs;
+/// about 50 µs.
 const SPINS: u32 = 4000;
+
+/// How many times it looks within a step before it sleeps all the same: a step may have ended in a panic.
+const STEP_SPINS: u32 = 1 << 16;
 
 /// Blocks that one claim word can count; a larger stage runs in batches.
 const MAX_BLOCKS: usize = 0xffff;
@@ -41,6 +46,8 @@ struct Shared {
     epoch: AtomicU32,
     sleepers: Mutex<usize>,
     wake: Condvar,
+    /// Whether a step is under way.
+    stepping: AtomicBool,
     quit: AtomicBool,
     panicked: AtomicBool,
 }
@@ -56,6 +63,8 @@ pub(crate) struct StagePool {
     shared: Arc<Shared>,
     workers: Vec<JoinHandle<()>>,
     epoch: u32,
+    /// Whether the caller works alone for now.
+    alone: bool,
 }
 
 impl std::fmt::Debug for StagePool {
@@ -74,6 +83,7 @@ impl StagePool {
             epoch: AtomicU32::new(0),
             sleepers: Mutex::new(0),
             wake: Condvar::new(),
+            stepping: AtomicBool::new(false),
             quit: AtomicBool::new(false),
             panicked: AtomicBool::new(false),
         });
@@ -84,7 +94,7 @@ impl StagePool {
                 std::thread::Builder::new().name("arbiter3d".into()).spawn(move || shared.work()).ok()
             })
             .collect();
-        Self { shared, workers, epoch: 0 }
+        Self { shared, workers, epoch: 0, alone: false }
     }
 
     /// Threads that take part, the caller included.
@@ -92,9 +102,32 @@ impl StagePool {
         self.workers.len() + 1
     }
 
+    /// A step begins, in which the workers help if there is enough to do for them.
+    pub fn begin_step(&mut self, enough: bool) {
+        self.alone = !enough || self.workers.is_empty();
+        if !self.alone {
+            self.shared.stepping.store(true, Ordering::SeqCst);
+            // A stage without blocks: no claim succeeds on it.
+            self.epoch = self.epoch.wrapping_add(1);
+            self.shared.epoch.store(self.epoch, Ordering::SeqCst);
+            self.wake_sleepers();
+        }
+    }
+
+    /// The step is over: the workers may sleep.
+    pub fn end_step(&mut self) {
+        self.alone = false;
+        self.shared.stepping.store(false, Ordering::SeqCst);
+    }
+
+    /// Threads that take part in the stages of this step.
+    pub fn active_threads(&self) -> usize {
+        if self.alone { 1 } else { self.threads() }
+    }
+
     /// Calls `stage(block)` for every block in `0..count`, on all threads, and returns when all are done.
     pub fn run<F: Fn(usize) + Sync>(&mut self, count: usize, stage: F) {
-        if self.workers.is_empty() || count <= 1 {
+        if self.workers.is_empty() || self.alone || count <= 1 {
             (0..count).for_each(stage);
             return;
         }
@@ -196,12 +229,14 @@ impl Shared {
 
     /// Waits until the stage number differs from `seen`.
     fn next_epoch(&self, seen: u32) -> u32 {
-        for _ in 0..SPINS {
+        let mut spins = 0;
+        while spins < if self.stepping.load(Ordering::Relaxed) { STEP_SPINS } else { SPINS } {
             let epoch = self.epoch.load(Ordering::SeqCst);
             if epoch != seen {
                 return epoch;
             }
-            std::hint::spin_loop();
+            spins += 1;
+            if spins < SPINS { std::hint::spin_loop() } else { std::thread::yield_now() }
         }
         let mut sleepers = self.sleepers.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         *sleepers += 1;
@@ -219,6 +254,28 @@ impl Shared {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn workers_sleep_between_steps_and_help_within() {
+        let mut pool = StagePool::new(3);
+        let hits = AtomicU32::new(0);
+        for step in 0..300 {
+            pool.begin_step(step % 3 != 0);
+            assert_eq!(pool.active_threads(), if step % 3 == 0 { 1 } else { 3 });
+            for _ in 0..5 {
+                pool.run(7, |_| {
+                    hits.fetch_add(1, Ordering::Relaxed);
+                });
+            }
+            pool.end_step();
+            if step % 100 == 99 {
+                while *pool.shared.sleepers.lock().unwrap() < 2 {
+                    std::thread::yield_now();
+                }
+            }
+        }
+        assert_eq!(hits.load(Ordering::Relaxed), 300 * 5 * 7);
+    }
 
     #[test]
     fn every_block_runs_exactly_once_in_thousands_of_stages() {

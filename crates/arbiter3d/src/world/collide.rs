@@ -16,9 +16,7 @@ use super::filters::UserFilters;
 use super::pairs::Pair;
 use super::settings::WorldSettings;
 use super::shapes::ShapeSlot;
-use crate::arbiter::{
-    Arbiter, ArbiterKey, Contact, ContactData, EndReason, NONE, ONE_NORMAL, SLOTS, TANGENT_VELOCITY_OVERRIDDEN,
-};
+use crate::arbiter::{Arbiter, ArbiterKey, Contact, ContactData, NONE, ONE_NORMAL, SLOTS, TANGENT_VELOCITY_OVERRIDDEN};
 use crate::math::{Pose, Real, Rotation, Vec3, max, min};
 use crate::narrow_phase::{Manifold, collide};
 use crate::parallel::{Gather, SharedSlice};
@@ -86,7 +84,7 @@ impl World {
         }
         scratch.apart.sort_unstable();
         for pair in scratch.apart.drain(..) {
-            self.remove_pair(pair, EndReason::Separated);
+            self.part_pair(pair);
         }
         scratch.empty.retain(|&index| self.arbiters.at(index).alive);
         scratch.begins.sort_unstable_by_key(|begin| begin.0);
@@ -97,6 +95,7 @@ impl World {
     }
 
     fn run_pairs(&mut self, dt: Real, news: &Gather<News>) {
+        self.active_pairs.refresh();
         let context = CollideContext {
             shapes: &self.shapes,
             bodies: &self.bodies,
@@ -107,7 +106,7 @@ impl World {
             moved: &self.moved_shapes,
             dt,
         };
-        let active = &self.active_pairs;
+        let active = self.active_pairs.list();
         let pairs = SharedSlice::new(&mut self.pairs);
         let arbiters = SharedSlice::new(self.arbiters.slots_mut());
         let blocks = active.len().div_ceil(PAIRS_PER_BLOCK);
@@ -153,17 +152,16 @@ impl World {
         update_contacts(&mut arbiter.data, manifold, &context, self.scaled.contact_break_distance);
         self.mix_shape_materials(index);
     }
+}
 
-    /// Whether the shapes of a pair overlap in the present poses.
-    pub(crate) fn pair_overlaps(&self, pair_index: u32) -> bool {
-        let pair = &self.pairs[pair_index as usize];
-        let [a, b] = pair.shapes.map(|slot| &self.shapes[slot as usize]);
-        let pose = |side: usize, shape: &ShapeSlot| self.bodies[pair.bodies[side] as usize].pose.mul(&shape.pose);
-        let relative = pose(0, a).relative(&pose(1, b));
-        let (mut cache, mut manifold) = (pair.cache, Manifold::EMPTY);
-        collide(&a.geometry, &b.geometry, &relative, 0.0, &mut cache, &mut manifold);
-        !manifold.points().is_empty()
-    }
+/// Whether the shapes of a pair overlap in the present poses.
+pub(crate) fn shapes_overlap(pair: &Pair, shapes: &[ShapeSlot], bodies: &[Body]) -> bool {
+    let [a, b] = pair.shapes.map(|slot| &shapes[slot as usize]);
+    let pose = |side: usize, shape: &ShapeSlot| bodies[pair.bodies[side] as usize].pose.mul(&shape.pose);
+    let relative = pose(0, a).relative(&pose(1, b));
+    let (mut cache, mut manifold) = (pair.cache, Manifold::EMPTY);
+    collide(&a.geometry, &b.geometry, &relative, 0.0, &mut cache, &mut manifold);
+    !manifold.points().is_empty()
 }
 
 impl CollideContext<'_> {

@@ -17,7 +17,6 @@
 use super::World;
 use super::definition::BodyKind;
 use super::shapes::ShapeSlot;
-use crate::broad_phase::TreeKind;
 use crate::math::{Aabb, Pose, Real, Vec3, max, min};
 use crate::narrow_phase::{Support, Sweep, gap, time_of_impact};
 use crate::shape::{Capsule, Cuboid, MeshSides, Shape, Sphere, TriangleMesh};
@@ -70,7 +69,7 @@ impl World {
     fn first_impact(&self, mover: &Mover<'_>, limit: Real) -> Real {
         let mut first = limit;
         let near = 2.0 * self.scaled.slop;
-        self.broad_phase.tree(TreeKind::Static).query(&mover.core_box(near), |slot| {
+        self.broad_phase.query_static(&mover.core_box(near), |slot| {
             let other = &self.shapes[slot as usize];
             let body = &self.bodies[other.body as usize];
             if body.kind == BodyKind::Static && !other.sensor && mover.shape.filter.accepts(&other.filter) {
@@ -82,7 +81,6 @@ impl World {
                 };
                 first = min(impact.unwrap_or(limit), first);
             }
-            true
         });
         first
     }

@@ -291,6 +291,16 @@ impl Listeners {
         self.bodies.remove(&body);
     }
 
+    /// Whether nobody listens to ends.
+    fn are_deaf_to_ends(&self) -> bool {
+        self.bodies.is_empty() && self.world.end.is_empty()
+    }
+
+    /// Whether nobody listens to begins.
+    fn are_deaf_to_begins(&self) -> bool {
+        self.bodies.is_empty() && self.world.begin.is_empty()
+    }
+
     fn begin(&mut self, context: &mut StepContext<'_>, event: &BeginEvent) {
         for body in [event.body1.index, event.body2.index] {
             if let Some(set) = self.bodies.get_mut(&body) {
@@ -353,6 +363,8 @@ pub(crate) struct Events {
     /// The batch whose listeners are being called, while these make the next one: empty in between, kept for its memory.
     spare_unbegun: Vec<(ArbiterKey, ArbiterId)>,
     spare_ends: Vec<EndEvent>,
+    /// Keys of the batch of ends with their places in it: sorted instead of the events, which are twenty times larger.
+    end_order: Vec<(ArbiterKey, ArbiterId, u32)>,
     spare_removals: Vec<Removal>,
 }
 
@@ -439,6 +451,7 @@ impl World {
             let mut batch = std::mem::take(&mut self.events.spare_unbegun);
             std::mem::swap(&mut batch, &mut self.events.unbegun);
             batch.sort_unstable();
+            let heard = !self.listeners.are_deaf_to_begins();
             for (key, id) in batch.drain(..) {
                 let Some(arbiter) = self.arbiters.index_of(id).map(|index| self.arbiters.at_mut(index)) else {
                     continue; // removed before its begin: neither begin nor end
@@ -446,9 +459,11 @@ impl World {
                 arbiter.begun = true;
                 let event = BeginEvent { arbiter: id, key, body1: arbiter.body1, body2: arbiter.body2 };
                 self.events.begin.events.push(event);
-                let mut listeners = std::mem::take(&mut self.listeners);
-                listeners.begin(&mut StepContext::new(self), &event);
-                self.listeners = listeners;
+                if heard {
+                    let mut listeners = std::mem::take(&mut self.listeners);
+                    listeners.begin(&mut StepContext::new(self), &event);
+                    self.listeners = listeners;
+                }
             }
             self.events.spare_unbegun = batch;
         }
@@ -461,13 +476,21 @@ impl World {
             while !self.events.pending_ends.is_empty() {
                 let mut batch = std::mem::take(&mut self.events.spare_ends);
                 std::mem::swap(&mut batch, &mut self.events.pending_ends);
-                batch.sort_unstable_by_key(|event| (event.key, event.arbiter));
-                for event in batch.drain(..) {
-                    self.events.end.events.push(event);
-                    let mut listeners = std::mem::take(&mut self.listeners);
-                    listeners.end(&mut StepContext::new(self), &event);
-                    self.listeners = listeners;
+                let mut order = std::mem::take(&mut self.events.end_order);
+                order.extend((0..).zip(&batch).map(|(place, event)| (event.key, event.arbiter, place)));
+                order.sort_unstable();
+                let heard = !self.listeners.are_deaf_to_ends();
+                for (.., place) in order.drain(..) {
+                    let event = &batch[place as usize];
+                    self.events.end.events.push(*event);
+                    if heard {
+                        let mut listeners = std::mem::take(&mut self.listeners);
+                        listeners.end(&mut StepContext::new(self), event);
+                        self.listeners = listeners;
+                    }
                 }
+                self.events.end_order = order;
+                batch.clear();
                 self.events.spare_ends = batch;
             }
             if self.removals.is_empty() {

@@ -82,7 +82,7 @@ pub struct World {
     pairs: Vec<pairs::Pair>,
     free_pairs: Vec<u32>,
     pair_set: PairSet,
-    active_pairs: Vec<u32>,
+    active_pairs: pairs::PlaceSet,
     arbiters: ArbiterStore,
     sleeping: SleepingIslands,
     finder: IslandFinder,
@@ -152,7 +152,7 @@ impl World {
             pairs: Vec::new(),
             free_pairs: Vec::new(),
             pair_set: PairSet::new(),
-            active_pairs: Vec::new(),
+            active_pairs: pairs::PlaceSet::default(),
             arbiters: ArbiterStore::new(tag),
             sleeping: SleepingIslands::default(),
             finder: IslandFinder::default(),
@@ -372,8 +372,7 @@ impl World {
         self.scratch.note_moved(slot);
         // Pairs whose bodies all rest are not visited: they are tested here and now.
         let body = self.shapes[slot as usize].body;
-        let resting: Vec<u32> =
-            self.pairs_of_body(body).filter(|&pair| self.pairs[pair as usize].active_place == NONE).collect();
+        let resting: Vec<u32> = self.pairs_of_body(body).filter(|&pair| !self.pairs[pair as usize].active).collect();
         for pair in resting {
             let boxes = self.pairs[pair as usize].shapes.map(|slot| self.broad_phase.fat_aabb(slot).copied());
             if !matches!(boxes, [Some(a), Some(b)] if a.overlaps(&b)) {

@@ -2,7 +2,8 @@
 //!
 //! A pair remembers what the narrow phase may use again: its arbiter, the last separating feature, and the relative pose at
 //! the last full manifold. The pairs of a body hang on a doubly linked list through the records; those with an awake body
-//! stand in `active_pairs`.
+//! stand in `active_pairs`, listed in the order of their places: the narrow phase walks them through memory in one direction,
+//! whatever has come and gone.
 
 use super::World;
 use super::definition::BodyKind;
@@ -17,9 +18,9 @@ pub(crate) struct Pair {
     pub bodies: [u32; 2],
     /// `NONE` while the shapes do not touch.
     pub arbiter: u32,
-    /// Place among the active pairs; `NONE` while both bodies rest.
-    pub active_place: u32,
     pub alive: bool,
+    /// Whether a body of the two is awake.
+    pub active: bool,
     pub sensor: bool,
     /// Whether a surface of the two moves along itself: its direction turns with its body.
     pub conveyor: bool,
@@ -83,9 +84,66 @@ impl Pair {
     }
 }
 
+/// A set of places, listed in order when asked for: one bit a place.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct PlaceSet {
+    bits: Vec<u64>,
+    list: Vec<u32>,
+    /// Whether the list is out of date.
+    changed: bool,
+}
+
+impl PlaceSet {
+    pub fn insert(&mut self, place: u32) {
+        let word = place as usize / 64;
+        if self.bits.len() <= word {
+            self.bits.resize(word + 1, 0);
+        }
+        self.bits[word] |= 1 << (place % 64);
+        self.changed = true;
+    }
+
+    pub fn remove(&mut self, place: u32) {
+        self.bits[place as usize / 64] &= !(1 << (place % 64));
+        self.changed = true;
+    }
+
+    /// Brings the list up to date.
+    pub fn refresh(&mut self) {
+        if !std::mem::take(&mut self.changed) {
+            return;
+        }
+        self.list.clear();
+        for (word, &bits) in self.bits.iter().enumerate() {
+            let mut rest = bits;
+            while rest != 0 {
+                self.list.push(word as u32 * 64 + rest.trailing_zeros());
+                rest &= rest - 1;
+            }
+        }
+    }
+
+    /// The places as of the last [`PlaceSet::refresh`], smallest first.
+    pub fn list(&self) -> &[u32] {
+        &self.list
+    }
+}
+
 impl World {
     /// Whether two shapes may have a pair at all.
     pub(crate) fn may_pair(&self, a: u32, b: u32) -> bool {
+        PairRules { shapes: &self.shapes, bodies: &self.bodies }.may_pair(a, b)
+    }
+}
+
+/// What decides whether two shapes may have a pair.
+pub(crate) struct PairRules<'a> {
+    pub shapes: &'a [super::shapes::ShapeSlot],
+    pub bodies: &'a [super::bodies::Body],
+}
+
+impl PairRules<'_> {
+    pub fn may_pair(&self, a: u32, b: u32) -> bool {
         let (shape_a, shape_b) = (&self.shapes[a as usize], &self.shapes[b as usize]);
         if shape_a.body == shape_b.body || !shape_a.filter.accepts(&shape_b.filter) {
             return false;
@@ -98,7 +156,9 @@ impl World {
             _ => kind_a != BodyKind::Static || kind_b != BodyKind::Static,
         }
     }
+}
 
+impl World {
     /// Makes a pair of two shapes that have none yet.
     pub(crate) fn add_pair(&mut self, a: u32, b: u32) {
         let smaller_first = self.shapes[a as usize].id < self.shapes[b as usize].id;
@@ -109,8 +169,8 @@ impl World {
             shapes,
             bodies,
             arbiter: NONE,
-            active_place: NONE,
             alive: true,
+            active: false,
             sensor: shapes.iter().any(|&slot| self.shapes[slot as usize].sensor),
             conveyor: shapes.iter().any(|&slot| self.shapes[slot as usize].material.tangent_velocity != Vec3::ZERO),
             overlapping: false,
@@ -149,17 +209,30 @@ impl World {
 
     /// Ends a pair: its arbiter ends for `reason`, a sensor's overlap ends too.
     pub(crate) fn remove_pair(&mut self, index: u32, reason: EndReason) {
-        let pair = self.pairs[index as usize].clone();
-        if pair.arbiter != NONE {
-            self.end_arbiter(pair.arbiter, reason);
+        for slot in self.pairs[index as usize].shapes {
+            self.broad_phase.forget(slot);
         }
-        if pair.overlapping {
+        self.drop_pair(index, reason);
+    }
+
+    /// Ends a pair whose fat boxes did not overlap any more in this step's search: the broad phase knows.
+    pub(crate) fn part_pair(&mut self, index: u32) {
+        self.drop_pair(index, EndReason::Separated);
+    }
+
+    fn drop_pair(&mut self, index: u32, reason: EndReason) {
+        let pair = &self.pairs[index as usize];
+        let (shapes, arbiter, overlapping) = (pair.shapes, pair.arbiter, pair.overlapping);
+        if arbiter != NONE {
+            self.end_arbiter(arbiter, reason);
+        }
+        if overlapping {
             self.set_sensor_overlap(index, false);
         }
         self.deactivate_pair(index);
         self.unlink_pair(index, 0);
         self.unlink_pair(index, 1);
-        self.pair_set.remove(pair.shapes[0], pair.shapes[1]);
+        self.pair_set.remove(shapes[0], shapes[1]);
         self.pairs[index as usize].alive = false;
         self.free_pairs.push(index);
     }
@@ -178,19 +251,13 @@ impl World {
     }
 
     pub(crate) fn activate_pair(&mut self, index: u32) {
-        if self.pairs[index as usize].active_place == NONE {
-            self.pairs[index as usize].active_place = self.active_pairs.len() as u32;
-            self.active_pairs.push(index);
-        }
+        self.pairs[index as usize].active = true;
+        self.active_pairs.insert(index);
     }
 
     pub(crate) fn deactivate_pair(&mut self, index: u32) {
-        let place = std::mem::replace(&mut self.pairs[index as usize].active_place, NONE);
-        if place != NONE {
-            self.active_pairs.swap_remove(place as usize);
-            if let Some(&moved) = self.active_pairs.get(place as usize) {
-                self.pairs[moved as usize].active_place = place;
-            }
+        if std::mem::take(&mut self.pairs[index as usize].active) {
+            self.active_pairs.remove(index);
         }
     }
 
@@ -215,6 +282,33 @@ impl World {
             self.bodies[body as usize].first_pair = next;
         } else {
             self.pairs[(previous >> 1) as usize].next[(previous & 1) as usize] = next;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::PlaceSet;
+    use std::collections::BTreeSet;
+
+    /// 2,000 random edits over 300 places: the list is that of a sorted set, however often a place comes and goes.
+    #[test]
+    fn places_are_listed_in_order_whatever_came_and_went() {
+        let (mut set, mut model) = (PlaceSet::default(), BTreeSet::new());
+        let mut state = 3_u64;
+        for edit in 0..2_000 {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            let place = (state >> 33) as u32 % 300;
+            if model.remove(&place) {
+                set.remove(place);
+            } else {
+                model.insert(place);
+                set.insert(place);
+            }
+            if edit % 7 == 0 {
+                set.refresh();
+                assert_eq!(set.list(), model.iter().copied().collect::<Vec<_>>());
+            }
         }
     }
 }

@@ -235,6 +235,11 @@ impl World {
         };
         self.shape_slots.insert(id.0, slot);
         let owner = &mut self.bodies[index as usize];
+        if owner.shapes.is_empty() {
+            // Most bodies have one shape: without this, room for four.
+            owner.shapes.reserve_exact(1);
+            owner.shape_slots.reserve_exact(1);
+        }
         owner.shapes.push(id);
         owner.shape_slots.push(slot);
         if owner.enabled {

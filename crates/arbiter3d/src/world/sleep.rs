@@ -121,7 +121,7 @@ impl World {
     /// Puts to sleep the islands whose bodies have all rested long enough.
     pub(crate) fn sleep_islands(&mut self) {
         let rested = |world: &Self, body: u32| world.bodies[body as usize].sleep_time >= world.settings.time_to_sleep;
-        if !self.settings.allow_sleep || !self.awake.iter().any(|&body| rested(self, body)) {
+        if !self.settings.allow_sleep || !self.scratch.any_rested {
             return;
         }
         let mut finder = std::mem::take(&mut self.finder);

@@ -2,21 +2,36 @@
 
 use super::World;
 use super::bodies::world_inverse_inertia;
+use super::collide::shapes_overlap;
+use super::pairs::PairRules;
 use super::timings::{Phase, PhaseClock};
 use crate::arbiter::{EndReason, NONE};
+use crate::broad_phase::Boxes;
 use crate::error::{Error, in_range};
 use crate::id::BodyId;
 use crate::math::{Aabb, Real, Vec3, min};
 use crate::parallel::{BlockList, Gather, SharedSlice};
 use crate::solver::{
-    IntegrateParameters, IntegrateTarget, Integration, Pass, PassParameters, PrepareContext, Softness, StoreTarget,
+    BodyMass, BodyMotion, BodyState, IntegrateParameters, IntegrateTarget, Integration, Pass, PassParameters,
+    PrepareContext, Softness, StoreTarget,
 };
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Overlap of the most heavily loaded contact at rest, in slops. A light body under a heavy pile would sink deeper into its
 /// soft springs: to 3 cm, measured on 1,000 mixed bodies.
 const DEEPEST_REST: Real = 1.97;
 /// Bodies that a thread takes at a time.
 const BODIES_PER_BLOCK: usize = 128;
+
+/// Rows whose contacts a thread looks at at a time.
+const ROWS_PER_BLOCK: usize = 512;
+/// Arbiters without contacts that a thread looks at at a time.
+const EMPTY_PER_BLOCK: usize = 16;
+/// Parts of the search for pairs for each thread: they differ in size.
+const PARTS_PER_THREAD: usize = 16;
+
+/// Awake bodies, pairs and arbiters from which on a step uses several threads: below, waiting for each other costs more.
+const WORK_FOR_THREADS: usize = 1500;
 
 /// Stiffest spring of a contact, as a share of the substep rate: past it, tall stacks ring.
 const MAX_CONTACT_RATE: Real = 0.1875;
@@ -39,8 +54,6 @@ pub struct StepReport {
 /// What a body's finalizing has to tell.
 #[derive(Clone, Copy, Debug)]
 enum BodyNews {
-    /// The box of a shape has left its fat box.
-    Moved { shape: u32, tight: Aabb, fat: Aabb },
     /// The body may have passed through something.
     Fast(u32),
     /// The body went non-finite.
@@ -53,7 +66,16 @@ pub(crate) struct StepScratch {
     pairs: Vec<(u32, u32)>,
     may_break: Vec<bool>,
     news: Gather<BodyNews>,
+    /// Shapes whose boxes have left their fat boxes in this step, then all that have since the last narrow phase.
+    left: Gather<u32>,
     moved: Vec<u32>,
+    /// Arbiters that have lost their last contact, then whether they end.
+    broken: Gather<u32>,
+    over: Vec<bool>,
+    /// Whether a body has rested long enough to sleep.
+    pub any_rested: bool,
+    /// Pairs that several threads have found.
+    found: Gather<(u32, u32)>,
     /// Bodies that this step integrates.
     sorted_awake: Vec<u32>,
     /// Memory for the list with the woken ones.
@@ -80,6 +102,8 @@ impl World {
         }
         self.dt = dt;
         let mut clock = PhaseClock::start();
+        let work = self.awake.len() + self.active_pairs.list().len() + self.arbiters.order().len();
+        self.pool.begin_step(work >= WORK_FOR_THREADS);
         self.events.begin_step();
         self.flush_events();
         self.apply_forces();
@@ -106,6 +130,7 @@ impl World {
         clock.mark(Phase::EndEvents);
         self.sleep_islands();
         self.events.end_step();
+        self.pool.end_step();
         clock.mark(Phase::Sleep);
         self.timings = clock.finish();
         #[cfg(debug_assertions)]
@@ -117,14 +142,26 @@ impl World {
 
     /// Lists the awake bodies and turns gravity and their forces into this step's accelerations.
     fn apply_forces(&mut self) {
-        let mut list = std::mem::take(&mut self.scratch.sorted_awake);
-        list.clone_from(&self.awake);
-        list.sort_unstable();
-        for &index in &list {
-            self.accelerate(index);
+        if std::mem::take(&mut self.awake_changed) {
+            let list = &mut self.scratch.sorted_awake;
+            list.clone_from(&self.awake);
+            list.sort_unstable();
         }
-        self.scratch.sorted_awake = list;
-        self.awake_changed = false;
+        let awake = &self.scratch.sorted_awake;
+        let gravity = self.settings.gravity;
+        let bodies = SharedSlice::new(&mut self.bodies);
+        let states = SharedSlice::new(&mut self.solver_bodies.states);
+        let motions = SharedSlice::new(&mut self.solver_bodies.motions);
+        let masses = &self.solver_bodies.masses;
+        self.pool.run(awake.len().div_ceil(BODIES_PER_BLOCK), |block| {
+            for &body in block_of(awake, block) {
+                let index = body as usize;
+                // SAFETY: a body stands in the list once.
+                let (body, state, motion) =
+                    unsafe { (bodies.get_mut(index), states.get_mut(index), motions.get_mut(index)) };
+                accelerate(body, (state, motion, &masses[index]), gravity);
+            }
+        });
     }
 
     /// Lets bodies that contacts have woken take part in the step in full, and drops those that listeners have removed. What
@@ -138,34 +175,23 @@ impl World {
         list.sort_unstable();
         for &index in &list {
             if self.scratch.sorted_awake.binary_search(&index).is_err() {
-                self.accelerate(index);
+                let at = index as usize;
+                let solver = &mut self.solver_bodies;
+                let records = (&mut solver.states[at], &mut solver.motions[at], &solver.masses[at]);
+                accelerate(&mut self.bodies[at], records, self.settings.gravity);
             }
         }
         std::mem::swap(&mut list, &mut self.scratch.sorted_awake);
         self.scratch.admitted = list;
     }
 
-    /// Turns gravity and the forces on a body into its accelerations, and starts its motion of this step at zero.
-    fn accelerate(&mut self, index: u32) {
-        let body = &mut self.bodies[index as usize];
-        let motion = &mut self.solver_bodies.motions[index as usize];
-        let mass = &self.solver_bodies.masses[index as usize];
-        let (free, _) = body.locked_axes.free();
-        let dynamic = motion.kinematic == 0.0 && !body.frozen;
-        let gravity = self.settings.gravity * body.gravity_scale * free;
-        motion.acceleration = if dynamic { gravity + mass.inverse_mass * body.force } else { Vec3::ZERO };
-        motion.angular_acceleration = if dynamic { mass.inverse_inertia.mul(body.torque) } else { Vec3::ZERO };
-        (body.force, body.torque) = (Vec3::ZERO, Vec3::ZERO);
-        let state = &mut self.solver_bodies.states[index as usize];
-        (state.translation, state.turn, state.constrained) = (Vec3::ZERO, Vec3::ZERO, 0.0);
-    }
-
     /// Finds the pairs of shapes that have moved.
     fn find_pairs(&mut self) {
+        if !self.broad_phase.has_moved() {
+            return;
+        }
         let mut found = std::mem::take(&mut self.scratch.pairs);
-        let mut broad_phase = std::mem::take(&mut self.broad_phase);
-        broad_phase.find_pairs(|a, b| !self.pair_set.contains(a, b) && self.may_pair(a, b), &mut found);
-        self.broad_phase = broad_phase;
+        self.search_pairs(&mut found);
         for &(a, b) in &found {
             if self.passes_pair_filter(a, b) {
                 self.add_pair(a, b);
@@ -173,6 +199,29 @@ impl World {
         }
         found.clear();
         self.scratch.pairs = found;
+    }
+
+    /// The pairs that are new, sorted.
+    fn search_pairs(&mut self, found: &mut Vec<(u32, u32)>) {
+        let rules = PairRules { shapes: &self.shapes, bodies: &self.bodies };
+        // A filter of the user's own may have changed its mind about a pair that it has rejected.
+        let (pair_set, trust) = (&self.pair_set, self.filters.pair.is_none());
+        let is_new = |a: u32, b: u32, known: bool| !(known && trust || pair_set.contains(a, b)) && rules.may_pair(a, b);
+        let threads = self.pool.active_threads();
+        if threads == 1 {
+            self.broad_phase.find_pairs(is_new, found);
+            return;
+        }
+        self.scratch.found.prepare(threads, BODIES_PER_BLOCK);
+        self.broad_phase.prepare(PARTS_PER_THREAD * threads);
+        let (broad_phase, gather) = (&self.broad_phase, &self.scratch.found);
+        let work = broad_phase.work();
+        self.pool.run(work.len(), |block| {
+            let mut list = gather.block();
+            broad_phase.pairs_of(&work[block], is_new, |a, b| list.push((a, b)));
+        });
+        found.append(self.scratch.found.list());
+        self.broad_phase.finish(found);
     }
 
     fn call_providers(&mut self) {
@@ -265,15 +314,19 @@ impl World {
     /// New poses, boxes and rest times; then continuous collision for the fast.
     fn finalize(&mut self, dt: Real, report: &mut StepReport) {
         let mut gather = std::mem::take(&mut self.scratch.news);
+        let mut left = std::mem::take(&mut self.scratch.left);
         gather.prepare(self.pool.threads(), BODIES_PER_BLOCK);
-        self.finalize_bodies(dt, &gather);
+        left.prepare(self.pool.threads(), BODIES_PER_BLOCK);
+        self.finalize_bodies(dt, &gather, &left);
+        // Before the fast: a body that is stopped short moves its boxes back. In any order: the tree comes out the same.
+        self.broad_phase.lift(left.list());
+        self.scratch.moved.append(left.list());
+        self.scratch.left = left;
         let news = gather.list();
-        // Threads report in any order; the trees and the report must not depend on it.
+        // Threads report in any order; the report must not depend on it.
         news.sort_unstable_by_key(|item| match *item {
             BodyNews::Broken(body) => (0, body),
-            // Before the fast: a body that is stopped short moves its boxes back.
-            BodyNews::Moved { shape, .. } => (1, shape),
-            BodyNews::Fast(body) => (2, body),
+            BodyNews::Fast(body) => (1, body),
         });
         for item in news.drain(..) {
             match item {
@@ -282,35 +335,41 @@ impl World {
                     report.frozen.push(self.body_id(body));
                 }
                 BodyNews::Fast(body) => self.stop_at_impact(body),
-                BodyNews::Moved { shape, tight, fat } => {
-                    if self.broad_phase.update(shape, &tight, &fat) {
-                        self.moved_shapes[shape as usize] = true;
-                        self.scratch.moved.push(shape);
-                    }
-                }
             }
         }
         self.scratch.news = gather;
     }
 
-    fn finalize_bodies(&mut self, dt: Real, news: &Gather<BodyNews>) {
+    fn finalize_bodies(&mut self, dt: Real, news: &Gather<BodyNews>, left: &Gather<u32>) {
         let awake = &self.scratch.sorted_awake;
-        let world =
-            FinalizeContext { shapes: &self.shapes, broad_phase: &self.broad_phase, settings: &self.scaled, dt };
+        let world = FinalizeContext {
+            shapes: &self.shapes,
+            boxes: self.broad_phase.boxes(),
+            moved: SharedSlice::new(&mut self.moved_shapes),
+            settings: &self.scaled,
+            dt,
+        };
+        let rested = AtomicBool::new(false);
         let bodies = SharedSlice::new(&mut self.bodies);
         let states = SharedSlice::new(&mut self.solver_bodies.states);
         let motions = SharedSlice::new(&mut self.solver_bodies.motions);
         let masses = SharedSlice::new(&mut self.solver_bodies.masses);
         self.pool.run(awake.len().div_ceil(BODIES_PER_BLOCK), |block| {
-            let mut found = news.block();
+            let mut found = (news.block(), left.block());
+            let mut any_rested = false;
             for &index in block_of(awake, block) {
                 let at = index as usize;
                 // SAFETY: a body stands in the list once.
                 let (body, state, motion, mass) =
                     unsafe { (bodies.get_mut(at), states.get_mut(at), motions.get_mut(at), masses.get_mut(at)) };
                 world.finalize_body(index, (body, state, motion, mass), &mut found);
+                any_rested |= body.sleep_time >= world.settings.time_to_sleep;
+            }
+            if any_rested {
+                rested.store(true, Ordering::Relaxed);
             }
         });
+        self.scratch.any_rested = rested.into_inner();
     }
 
     /// Puts a body that went non-finite back to its last finite pose and stops it.
@@ -326,17 +385,7 @@ impl World {
     /// Drops contacts past the break distance and ends arbiters that have none left and whose shapes do not overlap.
     fn end_broken(&mut self) {
         let mut empty = std::mem::take(&mut self.narrow.empty);
-        let may_break = std::mem::take(&mut self.scratch.may_break);
-        for (row, _) in self.plan.rows.iter().zip(&may_break).filter(|(_, may_break)| **may_break) {
-            let arbiter = self.arbiters.at_mut(row.arbiter);
-            let [pose1, pose2] =
-                [arbiter.body1, arbiter.body2].map(|body| self.solver_bodies.masses[body.index as usize].pose());
-            arbiter.data.break_contacts(&pose1, &pose2, self.scaled.contact_break_distance);
-            if arbiter.data.usage_mask & 15 == 0 {
-                empty.push(row.arbiter);
-            }
-        }
-        self.scratch.may_break = may_break;
+        self.break_contacts(&mut empty);
         let custom = if self.arbiters.custom > 0 { self.arbiters.order() } else { &[] };
         for &(_, index) in custom {
             let arbiter = self.arbiters.at(index);
@@ -346,20 +395,64 @@ impl World {
         }
         empty.sort_unstable();
         empty.dedup();
-        for &index in &empty {
-            let arbiter = self.arbiters.at(index);
-            if !arbiter.alive || arbiter.data.usage_mask & 15 != 0 {
-                continue;
-            }
-            let pair = arbiter.pair;
-            if pair == NONE || !self.pair_overlaps(pair) {
-                self.end_arbiter(index, EndReason::Separated);
-            } else {
-                self.pairs[pair as usize].has_manifold = false;
-            }
+        self.keep_overlapping(&mut empty);
+        for index in empty.drain(..) {
+            self.end_arbiter(index, EndReason::Separated);
         }
-        empty.clear();
         self.narrow.empty = empty;
+    }
+
+    /// Drops contacts past the break distance; arbiters that have none left are appended to `empty`, in no particular order.
+    fn break_contacts(&mut self, empty: &mut Vec<u32>) {
+        self.scratch.broken.prepare(self.pool.threads(), BODIES_PER_BLOCK);
+        let (rows, may_break) = (&self.plan.rows, &self.scratch.may_break);
+        let (broken, masses) = (&self.scratch.broken, &self.solver_bodies.masses);
+        let break_distance = self.scaled.contact_break_distance;
+        let arbiters = SharedSlice::new(self.arbiters.slots_mut());
+        self.pool.run(rows.len().div_ceil(ROWS_PER_BLOCK), |block| {
+            let mut found = broken.block();
+            let range = block * ROWS_PER_BLOCK..((block + 1) * ROWS_PER_BLOCK).min(rows.len());
+            for (row, _) in rows[range.clone()].iter().zip(&may_break[range]).filter(|(_, may_break)| **may_break) {
+                // SAFETY: an arbiter has one row.
+                let arbiter = unsafe { arbiters.get_mut(row.arbiter as usize) };
+                let [pose1, pose2] = [arbiter.body1, arbiter.body2].map(|body| masses[body.index as usize].pose());
+                arbiter.data.break_contacts(&pose1, &pose2, break_distance);
+                if arbiter.data.usage_mask & 15 == 0 {
+                    found.push(row.arbiter);
+                }
+            }
+        });
+        empty.append(self.scratch.broken.list());
+    }
+
+    /// Takes out of a list of arbiters without contacts those that go on: their shapes overlap, or they are gone already.
+    fn keep_overlapping(&mut self, empty: &mut Vec<u32>) {
+        let mut over = std::mem::take(&mut self.scratch.over);
+        over.clear();
+        over.resize(empty.len(), false);
+        let (arbiters, pairs, shapes, bodies) = (&self.arbiters, &self.pairs, &self.shapes, &self.bodies);
+        let (list, flags) = (&*empty, SharedSlice::new(&mut over));
+        self.pool.run(list.len().div_ceil(EMPTY_PER_BLOCK), |block| {
+            let first = block * EMPTY_PER_BLOCK;
+            for (at, &index) in list.iter().enumerate().skip(first).take(EMPTY_PER_BLOCK) {
+                let arbiter = arbiters.at(index);
+                let without = arbiter.alive && arbiter.data.usage_mask & 15 == 0;
+                let ends =
+                    without && (arbiter.pair == NONE || !shapes_overlap(&pairs[arbiter.pair as usize], shapes, bodies));
+                // SAFETY: each place belongs to one block.
+                unsafe { *flags.get_mut(at) = ends };
+            }
+        });
+        let mut flags = over.iter();
+        empty.retain(|&index| {
+            let ends = *flags.next().unwrap_or(&false);
+            let arbiter = self.arbiters.at(index);
+            if !ends && arbiter.alive && arbiter.pair != NONE && arbiter.data.usage_mask & 15 == 0 {
+                self.pairs[arbiter.pair as usize].has_manifold = false;
+            }
+            ends
+        });
+        self.scratch.over = over;
     }
 }
 
@@ -372,7 +465,9 @@ fn block_of(awake: &[u32], block: usize) -> &[u32] {
 /// What finalizing a body reads.
 struct FinalizeContext<'a> {
     shapes: &'a [super::shapes::ShapeSlot],
-    broad_phase: &'a crate::broad_phase::BroadPhase,
+    boxes: Boxes<'a>,
+    /// By shape: whether its proxy has moved.
+    moved: SharedSlice<'a, bool>,
     settings: &'a super::WorldSettings,
     dt: Real,
 }
@@ -381,13 +476,8 @@ impl FinalizeContext<'_> {
     fn finalize_body(
         &self,
         index: u32,
-        (body, state, motion, mass): (
-            &mut super::bodies::Body,
-            &mut crate::solver::BodyState,
-            &mut crate::solver::BodyMotion,
-            &mut crate::solver::BodyMass,
-        ),
-        news: &mut BlockList<'_, BodyNews>,
+        (body, state, motion, mass): (&mut super::bodies::Body, &mut BodyState, &mut BodyMotion, &mut BodyMass),
+        (news, left): &mut (BlockList<'_, BodyNews>, BlockList<'_, u32>),
     ) {
         let center = mass.center + state.translation;
         let finite = center.is_finite()
@@ -410,25 +500,28 @@ impl FinalizeContext<'_> {
             if motion.kinematic > 0.0 { speed == 0.0 } else { body.can_sleep && speed < self.settings.sleep_speed };
         body.sleep_time = if rests { body.sleep_time + self.dt } else { 0.0 };
         let traveled = state.translation.length() + state.turn.length() * (body.reach - body.inner_radius);
-        if self.settings.continuous && body.continuous && motion.kinematic == 0.0 && traveled > 0.5 * body.inner_radius
-        {
+        let fast = self.settings.continuous && body.continuous && motion.kinematic == 0.0;
+        if fast && traveled > 0.5 * body.inner_radius && self.meets_static(body, center, state.translation) {
             news.push(BodyNews::Fast(index));
         }
         let displacement = state.linear_velocity * self.dt;
         for &slot in &body.shape_slots {
-            self.update_box(slot, body, displacement, news);
+            self.update_box(slot, body, displacement, left);
         }
+    }
+
+    /// Whether a body may have met a static shape on its way.
+    ///
+    /// In continuous collision a shape turns about its own middle, which goes straight. So no point comes farther from the way
+    /// of the centre of mass than three times the reach: once from there to that middle, twice across the body.
+    fn meets_static(&self, body: &super::bodies::Body, center: Vec3, translation: Vec3) -> bool {
+        let way = Aabb::from_points([center - translation, center]);
+        self.boxes.meets_static(&way.expand(3.0 * body.reach + self.settings.speculative_distance))
     }
 
     /// Reports a shape whose box has left its fat box. Boxes of fast shapes reach ahead, so that what they will touch within
     /// the next step is found now.
-    fn update_box(
-        &self,
-        slot: u32,
-        body: &super::bodies::Body,
-        displacement: Vec3,
-        news: &mut BlockList<'_, BodyNews>,
-    ) {
+    fn update_box(&self, slot: u32, body: &super::bodies::Body, displacement: Vec3, left: &mut BlockList<'_, u32>) {
         let shape = &self.shapes[slot as usize];
         let tight = shape.geometry.aabb(&body.pose.mul(&shape.pose));
         let speculative = self.settings.speculative_distance;
@@ -438,9 +531,27 @@ impl FinalizeContext<'_> {
             if ahead > speculative { displacement * (min(ahead, size + speculative) / ahead) } else { Vec3::ZERO };
         let tight = tight.sweep(reach);
         let near = tight.expand(speculative);
-        if self.broad_phase.fat_aabb(slot).is_some_and(|fat| !fat.contains(&near)) {
-            let creep = min(0.125 * shape.geometry.local_aabb().half_extents().length(), 2.5 * speculative);
-            news.push(BodyNews::Moved { shape: slot, tight: near, fat: near.expand(creep) });
+        let fat = || near.expand(min(0.125 * shape.geometry.local_aabb().half_extents().length(), 2.5 * speculative));
+        // SAFETY: a shape belongs to one body, which stands in the list of bodies once.
+        if unsafe { self.boxes.update(slot, &near, fat) } {
+            left.push(slot);
+            // SAFETY: as above.
+            unsafe { *self.moved.get_mut(slot as usize) = true };
         }
     }
+}
+
+/// Turns gravity and the forces on a body into its accelerations, and starts its motion of this step at zero.
+fn accelerate(
+    body: &mut super::bodies::Body,
+    (state, motion, mass): (&mut BodyState, &mut BodyMotion, &BodyMass),
+    gravity: Vec3,
+) {
+    let (free, _) = body.locked_axes.free();
+    let dynamic = motion.kinematic == 0.0 && !body.frozen;
+    let gravity = gravity * body.gravity_scale * free;
+    motion.acceleration = if dynamic { gravity + mass.inverse_mass * body.force } else { Vec3::ZERO };
+    motion.angular_acceleration = if dynamic { mass.inverse_inertia.mul(body.torque) } else { Vec3::ZERO };
+    (body.force, body.torque) = (Vec3::ZERO, Vec3::ZERO);
+    (state.translation, state.turn, state.constrained) = (Vec3::ZERO, Vec3::ZERO, 0.0);
 }

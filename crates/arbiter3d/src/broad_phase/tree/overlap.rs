@@ -9,10 +9,13 @@
 //! The work is a list of [`LinkPair`]s that do not depend on each other. [`PairSearch::split`] cuts it into parts for any
 //! number of threads; the union of what they find does not depend on the cut.
 
-use super::{DynamicTree, Link, MOVED};
+use super::{DynamicTree, Link, MAX_HEIGHT, MOVED};
 
 /// A pair of subtrees splits into at most so many.
 const MOST: usize = 4;
+
+/// Pairs that wait at most: each step down, in either tree, leaves all but one of [`MOST`] behind.
+const STACK: usize = 2 * MAX_HEIGHT as usize * (MOST - 1) + MOST;
 
 /// Two subtrees to be searched for pairs, or one to be searched against itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,6 +25,24 @@ impl LinkPair {
     #[inline(always)]
     fn is_leaves(self) -> bool {
         self.0.is_leaf() & self.1.is_leaf()
+    }
+}
+
+/// A leaf of a pair found.
+#[derive(Clone, Copy, Debug)]
+pub struct FoundLeaf(Link);
+
+impl FoundLeaf {
+    /// Its number.
+    #[inline(always)]
+    pub fn index(self) -> usize {
+        self.0.index()
+    }
+
+    /// Whether it is marked.
+    #[inline(always)]
+    pub fn is_marked(self) -> bool {
+        self.0.is_moved()
     }
 }
 
@@ -69,22 +90,18 @@ impl<'a> PairSearch<'a> {
         }
     }
 
-    /// Works a part off, calling `emit` with the data of both leaves of each pair. `stack` is only memory.
-    pub fn run(&self, part: LinkPair, stack: &mut Vec<LinkPair>, mut emit: impl FnMut(u32, u32)) {
-        stack.clear();
-        stack.push(part);
+    /// Works a part off, calling `emit` with both leaves of each pair.
+    pub fn run(&self, part: LinkPair, mut emit: impl FnMut(FoundLeaf, FoundLeaf)) {
+        let mut stack = [part; STACK];
         let mut depth = 1;
         while depth > 0 {
             depth -= 1;
             let part = stack[depth];
             if part.is_leaves() {
                 if !(self.within && part.0 == part.1) {
-                    emit(self.left.leaves[part.0.index()].data, self.right.leaves[part.1.index()].data);
+                    emit(FoundLeaf(part.0), FoundLeaf(part.1));
                 }
                 continue;
-            }
-            if stack.len() < depth + MOST {
-                stack.resize(depth + MOST, part);
             }
             if let Some(free) = stack[depth..].first_chunk_mut() {
                 depth += self.expand(part, free);

@@ -72,7 +72,7 @@ impl Model {
         match random.below(6) {
             0 => self.tree.rebuild_loose(),
             1 => self.tree.refit_marked(),
-            2 => self.tree.clear_marks(),
+            2 => self.tree.clear_marks(|_, _| ()),
             3 => self.tree.rebuild(),
             _ => {}
         }
@@ -138,7 +138,7 @@ fn pair_search_agrees_with_brute_force() {
     for round in 0..200 {
         for model in &mut models {
             if round % 4 == 0 {
-                model.tree.clear_marks();
+                model.tree.clear_marks(|_, _| ());
             }
             for _ in 0..20 {
                 model.edit(&mut random);
@@ -161,10 +161,11 @@ fn pair_search_agrees_with_brute_force() {
             let search =
                 if within { PairSearch::within(&first.tree) } else { PairSearch::between(&first.tree, &second.tree) };
             for parts in [1, 7, 100_000] {
-                let (mut work, mut found, mut stack) = (Vec::new(), Vec::new(), Vec::new());
+                let (mut work, mut found) = (Vec::new(), Vec::new());
                 search.split(parts, &mut work);
                 for part in work {
-                    search.run(part, &mut stack, |a, b| {
+                    search.run(part, |a, b| {
+                        let (a, b) = (first.tree.data(a.index() as u32), second.tree.data(b.index() as u32));
                         found.push(if within && a > b { (b, a) } else { (a, b) });
                     });
                 }
@@ -342,7 +343,7 @@ fn a_refit_is_tight() {
             tree.move_leaf(leaf, &random.aabb());
         }
         tree.refit_marked();
-        tree.clear_marks();
+        tree.clear_marks(|_, _| ());
         for index in tree.inner_nodes() {
             let node = &tree.nodes[index as usize];
             for side in 0..2 {
