@@ -56,6 +56,13 @@ pub(crate) struct SleepingIslands {
 }
 
 impl SleepingIslands {
+    /// Makes room for as many islands as there may be, so that falling asleep allocates nothing.
+    pub fn reserve(&mut self, bodies: usize) {
+        self.first.reserve(bodies.saturating_sub(self.first.len()));
+        self.free.reserve(bodies.saturating_sub(self.free.len()));
+        self.next.resize(bodies.max(self.next.len()), NONE);
+    }
+
     /// Makes an island of bodies of no other and returns its number.
     pub fn add(&mut self, bodies: &[u32]) -> u32 {
         let slots = bodies.iter().fold(self.next.len(), |slots, &body| slots.max(body as usize + 1));
@@ -69,7 +76,6 @@ impl SleepingIslands {
             return number;
         }
         self.first.push(after);
-        self.free.reserve(self.first.len());
         (self.first.len() - 1) as u32
     }
 

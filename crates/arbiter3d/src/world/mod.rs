@@ -270,6 +270,7 @@ impl World {
         } else {
             self.bodies.push(Body::new(self.tag.wrapping_add(1)));
             self.solver_bodies.push();
+            self.sleeping.reserve(self.bodies.len());
             (self.bodies.len() - 1) as u32
         };
         let body = &mut self.bodies[index as usize];
