@@ -18,7 +18,12 @@
 //! Faces and edges are weighed against each other as in the cuboid kernel, with
 //! [`tolerance_size`](super::polyhedron::tolerance_size) of the inner radius.
 //!
-//! The cache holds the last axis. It only ends the search early, when the hulls are still apart along it.
+//! The cache holds the last axis. It ends the search where the hulls are still apart along it, and else its gap is the
+//! first to beat, which leaves out more candidates. As equal gaps go to the lowest face or edges in any case, the
+//! result is the same bits with it or without.
+//!
+//! Loops over corners, faces and edges run over groups of [`LANES`] in plain arrays, compiled once for what every
+//! machine has and once for AVX2. Lanes never mix but to find a minimum, so both give the same bits.
 
 use super::clip::{ClipPoint, clip_polygon, reduce};
 use super::cuboid::{ALIGNED, EDGE_BIAS, stands_in};
@@ -27,6 +32,9 @@ use super::polyhedron::{ALL_LANES, CuboidFeatures, Polyhedron, negatives};
 use super::{Manifold, ManifoldPoint, PairCache};
 use crate::math::{Mat3, Pose, Real, Vec3, clamp, max, min, normalize_or};
 use crate::shape::{ConvexHull, Cuboid, HalfEdge, LANES, Plane};
+#[cfg(target_arch = "x86_64")]
+use crate::simd::Avx2;
+use crate::simd::{Baseline, Instructions, Kernel, SimdLevel};
 
 /// A face of hull 2 is the reference when it is better by this share of the smaller size.
 const FACE_BIAS: Real = 2e-3;
@@ -63,42 +71,114 @@ pub(crate) struct HullPair<'a> {
 
 /// Hull (shape 1) against hull.
 pub(crate) fn hull_hull(
-    a: &ConvexHull,
-    b: &ConvexHull,
+    level: SimdLevel,
+    (a, b): (&ConvexHull, &ConvexHull),
     pose: &Pose,
     margin: Real,
     (cache, manifold): (&mut PairCache, &mut Manifold),
 ) {
     manifold.clear();
-    let (polyhedron1, polyhedron2) = (Polyhedron::from_hull(a), Polyhedron::from_hull(b));
-    let pair = HullPair { polyhedron1, polyhedron2, m: pose.rotation.to_mat3(), t: pose.position, margin };
-    if pair.balls_are_apart() {
-        return;
-    }
-    let known = pair.known_axis(cache.words[0]);
-    if known.gap <= margin {
-        pair.search((pose, [Support::Hull(a), Support::Hull(b)]), known, (cache, manifold));
-    }
+    on_level(level, HullKernel { level, a, b, pose, margin, cache, manifold });
 }
 
 /// Hull (shape 1) against cuboid.
 pub(crate) fn hull_cuboid(
-    a: &ConvexHull,
-    b: &Cuboid,
+    level: SimdLevel,
+    (a, b): (&ConvexHull, &Cuboid),
     pose: &Pose,
     margin: Real,
     (cache, manifold): (&mut PairCache, &mut Manifold),
 ) {
     manifold.clear();
-    let features = CuboidFeatures::new(b);
-    let (polyhedron1, polyhedron2) = (Polyhedron::from_hull(a), features.view());
-    let pair = HullPair { polyhedron1, polyhedron2, m: pose.rotation.to_mat3(), t: pose.position, margin };
-    if pair.balls_are_apart() {
+    on_level(level, CuboidKernel { level, a, b, pose, margin, cache, manifold });
+}
+
+/// Runs a kernel with eight lanes where the level has them.
+#[inline(always)]
+fn on_level<K: Kernel>(level: SimdLevel, kernel: K) {
+    #[cfg(target_arch = "x86_64")]
+    if matches!(level, SimdLevel::Avx2 | SimdLevel::Avx512)
+        && let Some(avx2) = Avx2::detect()
+    {
+        avx2.run(kernel);
         return;
     }
-    let known = pair.known_axis(cache.words[0]);
-    if known.gap <= margin {
-        pair.search((pose, [Support::Hull(a), Support::Cuboid(*b)]), known, (cache, manifold));
+    let _ = level;
+    Baseline.run(kernel);
+}
+
+/// [`hull_hull`]: what most pairs that were apart need, before the search.
+struct HullKernel<'a> {
+    level: SimdLevel,
+    a: &'a ConvexHull,
+    b: &'a ConvexHull,
+    pose: &'a Pose,
+    margin: Real,
+    cache: &'a mut PairCache,
+    manifold: &'a mut Manifold,
+}
+
+impl Kernel for HullKernel<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let (m, t) = (self.pose.rotation.to_mat3(), self.pose.position);
+        let pair = |a, b| HullPair {
+            polyhedron1: Polyhedron::from_hull(a),
+            polyhedron2: Polyhedron::from_hull(b),
+            m,
+            t,
+            margin: self.margin,
+        };
+        let Some(known) = pair(self.a, self.b).touches(self.cache.words[0]) else { return };
+        // Put together anew, so that pairs that are apart need not write down what they do not read.
+        let pair = pair(self.a, self.b);
+        let supports = [Support::Hull(self.a), Support::Hull(self.b)];
+        pair.search(self.level, (self.pose, supports), known, (self.cache, self.manifold));
+    }
+}
+
+/// [`hull_cuboid`]: what most pairs that were apart need, before the search.
+struct CuboidKernel<'a> {
+    level: SimdLevel,
+    a: &'a ConvexHull,
+    b: &'a Cuboid,
+    pose: &'a Pose,
+    margin: Real,
+    cache: &'a mut PairCache,
+    manifold: &'a mut Manifold,
+}
+
+impl Kernel for CuboidKernel<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let features = CuboidFeatures::new(self.b);
+        let pair = HullPair {
+            polyhedron1: Polyhedron::from_hull(self.a),
+            polyhedron2: features.view(),
+            m: self.pose.rotation.to_mat3(),
+            t: self.pose.position,
+            margin: self.margin,
+        };
+        let Some(known) = pair.touches(self.cache.words[0]) else { return };
+        let supports = [Support::Hull(self.a), Support::Cuboid(*self.b)];
+        pair.search(self.level, (self.pose, supports), known, (self.cache, self.manifold));
+    }
+}
+
+/// The search for the best axis and the contact along it.
+struct SearchKernel<'a, const G: usize> {
+    pair: &'a HullPair<'a>,
+    pose: &'a Pose,
+    supports: [Support<'a>; 2],
+    known: Axis,
+    cache: &'a mut PairCache,
+    manifold: &'a mut Manifold,
+}
+
+impl<const G: usize> Kernel for SearchKernel<'_, G> {
+    #[inline(always)]
+    fn run(self) {
+        self.pair.search_faces::<G>((self.pose, self.supports), self.known, (self.cache, self.manifold));
     }
 }
 
@@ -163,12 +243,18 @@ struct EdgeGroup {
 }
 
 impl HullPair<'_> {
-    /// Whether balls around the hulls are farther apart than the margin.
+    /// Nothing if balls around the hulls, or the axis of the last step, show that they are farther apart than the
+    /// margin; else what that axis tells.
     #[inline(always)]
-    fn balls_are_apart(&self) -> bool {
+    fn touches(&self, code: u32) -> Option<Axis> {
         let between = self.m * self.polyhedron2.center + self.t - self.polyhedron1.center;
         let reach = (self.polyhedron1.outer_radius + self.polyhedron2.outer_radius) * (1.0 + BALL_SLACK) + self.margin;
-        between.length_squared() > reach * reach
+        if between.length_squared() > reach * reach {
+            return None;
+        }
+        let known = self.known_axis(code);
+        // Not `<=`: what is no number is left to the search.
+        if known.gap > self.margin { None } else { Some(known) }
     }
 
     /// The axis of the last step with the gap that it has now.
@@ -184,7 +270,8 @@ impl HullPair<'_> {
                 let (inverse, t) = inverted(&self.m, self.t);
                 face_gap(self.polyhedron2.planes[index], &self.polyhedron1, &inverse, t)
             }
-            EDGES if e1 < self.polyhedron1.edges.len() && e2 < self.polyhedron2.edges.len() => {
+            // The search names the first half of each edge.
+            EDGES if e1 < self.polyhedron1.edges.len() && e2 < self.polyhedron2.edges.len() && (e1 | e2) & 1 == 0 => {
                 let Some((gap, _)) = self.edge_gap(axis) else { return Axis::NONE };
                 gap
             }
@@ -194,14 +281,21 @@ impl HullPair<'_> {
     }
 
     /// Contacts, in the frame of polyhedron 1; no axis is known to part the hulls.
-    #[inline(never)]
-    fn search(&self, placed: (&Pose, [Support; 2]), known: Axis, (cache, manifold): (&mut PairCache, &mut Manifold)) {
+    #[inline(always)]
+    fn search(
+        &self,
+        level: SimdLevel,
+        (pose, supports): (&Pose, [Support; 2]),
+        known: Axis,
+        (cache, manifold): (&mut PairCache, &mut Manifold),
+    ) {
         let groups = self.polyhedron1.faces.len().max(self.polyhedron2.faces.len());
+        let pair = self;
         // Many faces are rare: only they pay for clearing large buffers.
         if groups <= FEW_FACE_GROUPS {
-            self.search_faces::<FEW_FACE_GROUPS>(placed, known, (cache, manifold));
+            on_level(level, SearchKernel::<FEW_FACE_GROUPS> { pair, pose, supports, known, cache, manifold });
         } else {
-            self.search_faces::<MAX_FACE_GROUPS>(placed, known, (cache, manifold));
+            on_level(level, SearchKernel::<MAX_FACE_GROUPS> { pair, pose, supports, known, cache, manifold });
         }
     }
 
@@ -243,6 +337,7 @@ impl HullPair<'_> {
     }
 
     /// Clips the incident face of one hull against the reference face of the other.
+    #[inline(always)]
     fn face_contact<const G: usize>(
         &self,
         face: Axis,
@@ -264,6 +359,7 @@ impl HullPair<'_> {
     }
 
     /// Whether the axis of a pair of edges is almost the normal of a face.
+    #[inline(always)]
     fn is_aligned(&self, edges: Axis, face: Axis) -> bool {
         let normal = if face.code & EDGES == FACE1 {
             self.polyhedron1.planes[face.index()].normal
@@ -301,16 +397,23 @@ impl HullPair<'_> {
             best = known;
         }
         let (set1, mut set2) = (view1.promising_edges(best.gap), view2.promising_edges(best.gap));
+        let words = self.polyhedron1.edges.len().div_ceil(128).min(MAX_EDGE_WORDS);
         let mut group = EdgeGroup::default();
         while group.fill(&mut set2, &self.polyhedron2, (&self.m, self.t)) {
-            for index1 in members(&set1) {
-                group.improve(index1, &Edge::new(&self.polyhedron1, 2 * index1 as usize), &mut best);
+            for (word, &bits) in set1[..words].iter().enumerate() {
+                let mut bits = bits;
+                while bits != 0 {
+                    let index1 = 64 * word as u32 + bits.trailing_zeros();
+                    bits &= bits - 1;
+                    group.improve(index1, &Edge::new(&self.polyhedron1, 2 * index1 as usize), &mut best);
+                }
             }
         }
         (best.code != 0).then_some(best)
     }
 
     /// Closest points of the two edges; nothing if the hulls are apart and the edges are closest beyond their ends.
+    #[inline(always)]
     fn edge_contact(&self, edges: Axis, manifold: &mut Manifold) {
         let (e1, e2) = edges.edges();
         let edge1 = Edge::new(&self.polyhedron1, e1);
@@ -331,6 +434,7 @@ impl HullPair<'_> {
 
     /// Hulls that pass each other with no corner over the other's face: the closest points, or the deepest corner.
     #[cold]
+    #[inline(never)]
     fn passing_by(&self, axis: Axis, (pose, supports): (&Pose, [Support; 2]), manifold: &mut Manifold) {
         let feature = 0x2000_0000;
         if let Some(c) = closest(&supports[0], &supports[1], pose) {
@@ -369,6 +473,7 @@ impl Edge {
         }
     }
 
+    #[inline(always)]
     fn placed(&self, m: &Mat3, t: Vec3) -> Self {
         Self { start: *m * self.start + t, along: *m * self.along, left: *m * self.left, right: *m * self.right }
     }
@@ -403,12 +508,13 @@ impl EdgeGroup {
     /// Takes up to [`LANES`] edges out of a set; false if there is none left.
     #[inline(always)]
     fn fill(&mut self, set: &mut EdgeSet, polyhedron: &Polyhedron, (m, t): (&Mat3, Vec3)) -> bool {
+        let words = polyhedron.edges.len().div_ceil(128).min(MAX_EDGE_WORDS);
         let mut count = 0;
-        for (word, bits) in set.iter_mut().enumerate() {
+        for (word, bits) in set[..words].iter_mut().enumerate() {
             while *bits != 0 && count < LANES {
                 let index = 64 * word as u32 + bits.trailing_zeros();
                 *bits &= *bits - 1;
-                let edge = Edge::new(polyhedron, 2 * index as usize).placed(m, t);
+                let edge = Edge::new(polyhedron, 2 * index as usize);
                 self.indices[count] = index;
                 let lists = [&mut self.start, &mut self.along, &mut self.left, &mut self.right];
                 for (list, v) in lists.into_iter().zip([edge.start, edge.along, edge.left, edge.right]) {
@@ -417,13 +523,25 @@ impl EdgeGroup {
                 count += 1;
             }
         }
+        if count == 0 {
+            return false;
+        }
         // No normals, no arcs: what is left over from the last group never crosses.
         for lane in count..LANES {
             for list in [&mut self.left, &mut self.right] {
                 (list[0][lane], list[1][lane], list[2][lane]) = (0.0, 0.0, 0.0);
             }
         }
-        count != 0
+        turn(&mut self.start, m);
+        turn(&mut self.along, m);
+        turn(&mut self.left, m);
+        turn(&mut self.right, m);
+        for k in 0..LANES {
+            self.start[0][k] += t.x;
+            self.start[1][k] += t.y;
+            self.start[2][k] += t.z;
+        }
+        true
     }
 
     /// Puts in the place of `best` what has a larger gap.
@@ -452,19 +570,14 @@ impl EdgeGroup {
     }
 }
 
-/// The members of a set in order.
+/// `m v` for each lane.
 #[inline(always)]
-fn members(set: &EdgeSet) -> impl Iterator<Item = u32> + '_ {
-    set.iter().enumerate().flat_map(|(word, &bits)| {
-        let mut bits = bits;
-        std::iter::from_fn(move || {
-            let bit = bits.trailing_zeros();
-            (bits != 0).then(|| {
-                bits &= bits - 1;
-                64 * word as u32 + bit
-            })
-        })
-    })
+fn turn(v: &mut [[Real; LANES]; 3], m: &Mat3) {
+    let [x, y, z] = *v;
+    for (axis, list) in v.iter_mut().enumerate() {
+        let (a, b, c) = (m.x_axis[axis], m.y_axis[axis], m.z_axis[axis]);
+        *list = std::array::from_fn(|k| a * x[k] + b * y[k] + c * z[k]);
+    }
 }
 
 /// `mᵀ v`: the direction `v` in the frame whose axes are the columns of `m`.
@@ -489,11 +602,7 @@ fn face_gap(plane: Plane, other: &Polyhedron, m: &Mat3, t: Vec3) -> Real {
 /// `u · v` for each lane.
 #[inline(always)]
 fn dots(u: Vec3, v: &[[Real; LANES]; 3]) -> [Real; LANES] {
-    let mut sum = [0.0; LANES];
-    for k in 0..LANES {
-        sum[k] = u.x * v[0][k] + u.y * v[1][k] + u.z * v[2][k];
-    }
-    sum
+    std::array::from_fn(|k| u.x * v[0][k] + u.y * v[1][k] + u.z * v[2][k])
 }
 
 impl<'a, const G: usize> View<'a, G> {
@@ -546,10 +655,12 @@ impl<'a, const G: usize> View<'a, G> {
     #[inline(always)]
     fn best_face(&self, known: Option<(usize, Real)>, floor: Real) -> (usize, Real) {
         let radius = self.other.inner_radius * (1.0 - BALL_SLACK);
-        let (first, mut gap) = known.unwrap_or_else(|| {
+        let (first, mut gap) = if let Some(known) = known {
+            known
+        } else {
             let first = self.highest();
             (first, if self.height(first) - radius < floor { -Real::MAX } else { self.face_gap(first) })
-        });
+        };
         let mut best = first;
         for (group, heights) in self.heights[..self.own.faces.len()].iter().enumerate() {
             let bound = max(gap, floor);
@@ -575,13 +686,10 @@ impl<'a, const G: usize> View<'a, G> {
     fn promising_edges(&self, floor: Real) -> EdgeSet {
         let limit = floor + self.other.inner_radius * (1.0 - BALL_SLACK);
         let squared = limit * limit;
-        // `height / cos(half the arc) >= limit` for a height above zero.
-        let reaches = |height: Real, cosine_squared: Real| {
-            (height >= limit) | ((height > 0.0) & (height * height >= squared * cosine_squared))
-        };
         let mut set = [0; MAX_EDGE_WORDS];
         for (group, (heights, faces)) in self.heights.iter().zip(self.own.faces).enumerate() {
-            // Where neither `height >= limit` nor the other test can hold, both differences are negative.
+            // A face whose height `h` is below the limit reaches it on no arc to a lower face if `h / cos(half the
+            // arc)` does not: then both differences are negative.
             let short = std::array::from_fn(|k| heights[k] - limit);
             let flat = std::array::from_fn(|k| {
                 if heights[k] > 0.0 { heights[k] * heights[k] - squared * faces.cosine_squared[k] } else { -1.0 }
@@ -593,11 +701,11 @@ impl<'a, const G: usize> View<'a, G> {
                 if face >= self.own.planes.len() {
                     break; // padding, which only a pose that is no number can reach
                 }
-                // The start of an edge is on both planes, so `n · (m − v)` is the height over the plane. The edge is
-                // met from the higher of its faces.
-                for edge in self.own.face_loop(face) {
-                    let met = reaches(heights[face % LANES], self.own.arcs[edge / 2]);
-                    set[edge / 128] |= u64::from(met) << (edge / 2 % 64);
+                // The edge is met from the higher of its faces.
+                let height = self.height(face);
+                for border in self.own.border(face) {
+                    let rises = (height > 0.0) & (height * height >= squared * border.cosine_squared);
+                    set[border.edge as usize / 64] |= u64::from((height >= limit) | rises) << (border.edge % 64);
                 }
             }
         }
@@ -605,6 +713,7 @@ impl<'a, const G: usize> View<'a, G> {
     }
 
     /// Clips the incident face against the reference face; the manifold is in the own frame.
+    #[inline(always)]
     fn face_contact(&self, face: usize, reach: (Real, Real), manifold: &mut Manifold) {
         let incident = self.incident_face(self.own.planes[face].normal);
         let corners = self.own.face_loop(face).count() + self.other.face_loop(incident).count();
@@ -645,7 +754,9 @@ impl<'a, const G: usize> View<'a, G> {
         manifold: &mut Manifold,
     ) {
         let plane = self.own.planes[face];
-        let (mut front, mut back) = ([ClipPoint::default(); N], [ClipPoint::default(); N]);
+        let mut buffers = [[ClipPoint::default(); N]; 2];
+        let [front, back] = &mut buffers;
+        let (mut front, mut back) = (front, back);
         let mut count = 0;
         for edge in self.other.face_loop(incident) {
             let position = self.m * self.other.vertices[self.other.edges[edge].origin as usize] + self.t;
@@ -655,7 +766,7 @@ impl<'a, const G: usize> View<'a, G> {
         }
         for (cut, edge) in self.own.face_loop(face).enumerate() {
             let (out, offset) = self.own.side_plane(edge);
-            count = clip_polygon(&front[..count], (out, offset + GROWTH * size), cut as u32, &mut back);
+            count = clip_polygon(&front[..count], (out, offset + GROWTH * size), cut as u32, back);
             std::mem::swap(&mut front, &mut back);
         }
         let mut kept = 0;
@@ -679,3 +790,6 @@ impl<'a, const G: usize> View<'a, G> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

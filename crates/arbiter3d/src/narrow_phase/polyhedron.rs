@@ -5,7 +5,7 @@
 //! down axis `k`, face `2k + 1` up.
 
 use crate::math::{Real, Vec3, abs3, max, min};
-use crate::shape::{ConvexHull, CornerGroup, Cuboid, FaceGroup, HalfEdge, LANES, Plane};
+use crate::shape::{BorderEdge, ConvexHull, CornerGroup, Cuboid, FaceGroup, HalfEdge, LANES, Plane};
 
 /// Corners of each face of a cuboid, counter-clockwise from outside.
 const LOOPS: [[u8; 4]; 6] = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
@@ -61,8 +61,28 @@ const fn find(ids: &[[u16; 4]; 6], faces: usize, a: u8, b: u8) -> u16 {
     u16::MAX
 }
 
-/// `cos²` of half the arc between the normals of two faces of a cuboid, for its twelve edges.
-const ARCS: [Real; 12] = [0.5; 12];
+/// `cos²` of half the arc between the normals of two faces of a cuboid.
+const ARC: Real = 0.5;
+
+/// Where each face's edges start, and those edges.
+const BORDERS: ([u16; 7], [BorderEdge; 24]) = borders();
+
+const fn borders() -> ([u16; 7], [BorderEdge; 24]) {
+    let mut border = [BorderEdge { edge: 0, cosine_squared: ARC }; 24];
+    let (mut face, mut count) = (0, 0);
+    while face < 6 {
+        let mut edge = 0;
+        while edge < 24 {
+            if TOPOLOGY.0[edge].face == face {
+                border[count].edge = edge as u16 / 2;
+                count += 1;
+            }
+            edge += 1;
+        }
+        face += 1;
+    }
+    ([0, 4, 8, 12, 16, 20, 24], border)
+}
 
 /// Where each corner's faces start, and those faces, in the order of their half edges.
 const RINGS: ([u16; 9], [u16; 24]) = rings();
@@ -142,7 +162,7 @@ impl CuboidFeatures {
         let planes = [-Vec3::X, Vec3::X, -Vec3::Y, Vec3::Y, -Vec3::Z, Vec3::Z].map(plane);
         let mut faces = FaceGroup::PADDING;
         for (face, plane) in planes.iter().enumerate() {
-            faces.set(face, plane, ARCS[0]);
+            faces.set(face, plane, ARC);
         }
         let list = |bit: usize, x: Real| std::array::from_fn::<Real, LANES, _>(|i| sign(i, bit, x));
         Self {
@@ -165,7 +185,7 @@ impl CuboidFeatures {
             corners: &self.corners,
             faces: &self.faces,
             sides: &[],
-            arcs: &ARCS,
+            borders: (&BORDERS.0, &BORDERS.1),
             rings: (&RINGS.0, &RINGS.1),
             center: Vec3::ZERO,
             inner_radius: self.inner_radius,
@@ -186,10 +206,11 @@ pub(crate) struct Polyhedron<'a> {
     pub corners: &'a [CornerGroup],
     /// The planes, in groups.
     pub faces: &'a [FaceGroup],
-    /// The plane through each half edge, square to its face; none for a cuboid, where it is the face beyond the edge.
+    /// The plane through each half edge, square to its face; none for a cuboid, which has them made as they
+    /// are needed.
     sides: &'a [Plane],
-    /// For each edge `cos²` of half the arc between the normals of its faces.
-    pub arcs: &'a [Real],
+    /// Where each face's edges start, and those edges.
+    borders: (&'a [u16], &'a [BorderEdge]),
     /// Where each corner's faces start, and those faces, in the order of their half edges.
     rings: (&'a [u16], &'a [u16]),
     /// A point inside.
@@ -214,7 +235,7 @@ impl<'a> Polyhedron<'a> {
             corners: &features.corners,
             faces: &features.faces,
             sides: &features.sides,
-            arcs: &features.arcs,
+            borders: (&features.border_starts, &features.border),
             rings: (&features.ring_starts, &features.ring_faces),
             center: hull.centroid(),
             inner_radius: hull.inner_radius(),
@@ -245,11 +266,19 @@ impl<'a> Polyhedron<'a> {
     /// The plane through a half edge, square to its face, looking out of the face: `(normal, offset)` of unit length.
     #[inline(always)]
     pub(crate) fn side_plane(&self, edge: usize) -> (Vec3, Real) {
-        let plane = match self.sides.get(edge) {
-            Some(side) => side,
-            None => &self.planes[self.edges[edge ^ 1].face as usize],
-        };
-        (plane.normal, plane.offset)
+        if let Some(side) = self.sides.get(edge) {
+            return (side.normal, side.offset);
+        }
+        let (a, b) = self.edge_points(edge);
+        let out = (b - a).cross(self.planes[self.edges[edge].face as usize].normal);
+        let out = out * (1.0 / out.length());
+        (out, out.dot(a))
+    }
+
+    /// The edges around a face.
+    #[inline(always)]
+    pub(crate) fn border(&self, face: usize) -> &'a [BorderEdge] {
+        &self.borders.1[self.borders.0[face] as usize..self.borders.0[face + 1] as usize]
     }
 
     /// The faces around a corner.

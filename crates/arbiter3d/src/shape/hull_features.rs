@@ -4,9 +4,9 @@
 //! a group becomes a few vector instructions. The corners are padded with the first corner, which changes no extreme;
 //! the planes are padded with one that everything is endlessly far behind.
 //!
-//! Per half edge: the plane through it, square to its face, that clipping cuts by. Per edge: `cos²` of half the arc
-//! between the normals of its faces, `(1 + a · b) / 2`, which bounds what a pair of edges can gain over a face. Per
-//! corner: the faces around it, in the order of their half edges.
+//! Per half edge: the plane through it, square to its face, that clipping cuts by. Per face: its edges, each with `cos²`
+//! of half the arc between the normals of its faces, `(1 + a · b) / 2`, which bounds what a pair of edges can gain over
+//! a face. Per corner: the faces around it, in the order of their half edges.
 
 use super::hull::{HalfEdge, Plane};
 use crate::math::{Real, Vec3, min};
@@ -53,6 +53,15 @@ impl FaceGroup {
     }
 }
 
+/// An edge as one of its faces sees it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct BorderEdge {
+    /// Half the number of its half edges.
+    pub edge: u16,
+    /// `cos²` of half the arc between the normals of its faces.
+    pub cosine_squared: Real,
+}
+
 /// See the top of this file.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct HullFeatures {
@@ -60,8 +69,10 @@ pub(crate) struct HullFeatures {
     pub faces: Vec<FaceGroup>,
     /// For each half edge the plane through it, square to its face, looking out of the face.
     pub sides: Vec<Plane>,
-    /// For each edge `cos²` of half the arc between the normals of its faces.
-    pub arcs: Vec<Real>,
+    /// Where in `border` each face's edges start, and the end of the last.
+    pub border_starts: Vec<u16>,
+    /// The edges around each face.
+    pub border: Vec<BorderEdge>,
     /// Where in `ring_faces` each corner's faces start, and the end of the last.
     pub ring_starts: Vec<u16>,
     pub ring_faces: Vec<u16>,
@@ -73,13 +84,15 @@ impl HullFeatures {
     pub(crate) fn new(vertices: &[Vec3], planes: &[Plane], edges: &[HalfEdge], center: Vec3) -> Self {
         let arcs = arcs(planes, edges);
         let (ring_starts, ring_faces) = rings(vertices.len(), edges);
+        let (border_starts, border) = borders(planes.len(), edges, &arcs);
         let distance = |v: &Vec3| (v.as_dvec3() - center.as_dvec3()).length();
         let furthest = vertices.iter().map(distance).fold(0.0, |most: f64, d| if d > most { d } else { most });
         Self {
             corners: corner_groups(vertices),
             faces: face_groups(planes, edges, &arcs),
             sides: (0..edges.len()).map(|edge| side(vertices, planes, edges, edge)).collect(),
-            arcs,
+            border_starts,
+            border,
             ring_starts,
             ring_faces,
             outer_radius: furthest as Real,
@@ -119,6 +132,16 @@ fn side(vertices: &[Vec3], planes: &[Plane], edges: &[HalfEdge], edge: usize) ->
 fn arcs(planes: &[Plane], edges: &[HalfEdge]) -> Vec<Real> {
     let normal = |edge: &HalfEdge| planes[usize::from(edge.face)].normal;
     edges.as_chunks::<2>().0.iter().map(|[left, right]| 0.5 * (1.0 + normal(left).dot(normal(right)))).collect()
+}
+
+fn borders(count: usize, edges: &[HalfEdge], arcs: &[Real]) -> (Vec<u16>, Vec<BorderEdge>) {
+    let (mut starts, mut border) = (vec![0], Vec::with_capacity(edges.len()));
+    for face in 0..count {
+        let own = edges.iter().enumerate().filter(|(_, edge)| usize::from(edge.face) == face);
+        border.extend(own.map(|(edge, _)| BorderEdge { edge: edge as u16 / 2, cosine_squared: arcs[edge / 2] }));
+        starts.push(border.len() as u16);
+    }
+    (starts, border)
 }
 
 fn rings(count: usize, edges: &[HalfEdge]) -> (Vec<u16>, Vec<u16>) {

@@ -18,7 +18,7 @@ mod sphere;
 pub use capsule::Capsule;
 pub use cuboid::Cuboid;
 pub use hull::{ConvexHull, HalfEdge, Plane};
-pub(crate) use hull_features::{CornerGroup, FaceGroup, LANES};
+pub(crate) use hull_features::{BorderEdge, CornerGroup, FaceGroup, LANES};
 pub use mass::MassProperties;
 pub(crate) use mesh::Facet;
 pub use mesh::{MeshEdge, MeshNode, MeshRayHit, MeshSides, TriangleMesh};
