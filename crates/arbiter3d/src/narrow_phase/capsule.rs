@@ -179,7 +179,7 @@ impl CapsulePair<'_> {
         let (mut enter, mut leave) = (0.0, 1.0);
         let (mut enter_edge, mut leave_edge) = (0xFFF, 0xFFF);
         for edge in self.polyhedron.face_loop(face) {
-            let (out, offset) = self.polyhedron.side_plane(edge, plane.normal);
+            let (out, offset) = self.polyhedron.side_plane(edge);
             let (dp, dq) = (out.dot(p) - offset, out.dot(q) - offset);
             if dp > 0.0 && dq > 0.0 {
                 return false;

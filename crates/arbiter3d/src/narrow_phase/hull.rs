@@ -18,15 +18,23 @@
 //! Faces and edges are weighed against each other as in the cuboid kernel, with
 //! [`tolerance_size`](super::polyhedron::tolerance_size) of the inner radius.
 //!
-//! The cache holds the last axis. It only ends the search early, when the hulls are still apart along it.
+//! The cache holds the last axis. It ends the search where the hulls are still apart along it, and else its gap is the
+//! first to beat, which leaves out more candidates. As equal gaps go to the lowest face or edges in any case, the
+//! result is the same bits with it or without.
+//!
+//! Loops over corners, faces and edges run over groups of [`LANES`] in plain arrays, compiled once for what every
+//! machine has and once for AVX2. Lanes never mix but to find a minimum, so both give the same bits.
 
 use super::clip::{ClipPoint, clip_polygon, reduce};
 use super::cuboid::{ALIGNED, EDGE_BIAS, stands_in};
 use super::distance::{Support, closest};
-use super::polyhedron::{CuboidFeatures, Polyhedron};
+use super::polyhedron::{ALL_LANES, CuboidFeatures, Polyhedron, negatives};
 use super::{Manifold, ManifoldPoint, PairCache};
 use crate::math::{Mat3, Pose, Real, Vec3, clamp, max, min, normalize_or};
-use crate::shape::{ConvexHull, Cuboid, HalfEdge};
+use crate::shape::{ConvexHull, Cuboid, HalfEdge, LANES, Plane};
+#[cfg(target_arch = "x86_64")]
+use crate::simd::Avx2;
+use crate::simd::{Baseline, Instructions, Kernel, SimdLevel};
 
 /// A face of hull 2 is the reference when it is better by this share of the smaller size.
 const FACE_BIAS: Real = 2e-3;
@@ -36,15 +44,16 @@ const EDGE_GAIN: Real = 2e-4;
 const GROWTH: Real = 1e-4;
 /// Edges with `sin²` of their angle below this are parallel: faces stand in for them.
 const PARALLEL: Real = 1e-5;
-/// Edges of hull 2 that are held in the frame of hull 1 at a time.
-const BATCH: usize = 32;
+/// Share by which balls are taken to be larger or smaller than they are, so that rounding never makes them tell more
+/// than is true.
+const BALL_SLACK: Real = 1e-4;
 
-/// Edges that are tried at once.
-const LANES: usize = 8;
 /// A hull of 255 corners has at most 506 faces.
-const MAX_FACES: usize = 512;
+const MAX_FACE_GROUPS: usize = 64;
+/// Groups of faces that most hulls get by with.
+const FEW_FACE_GROUPS: usize = 8;
 /// A hull of 255 corners has at most 759 edges.
-const MAX_EDGES: usize = 768;
+const MAX_EDGE_WORDS: usize = 12;
 
 const FACE1: u32 = 1 << 30;
 const FACE2: u32 = 2 << 30;
@@ -54,37 +63,123 @@ const EDGES: u32 = 3 << 30;
 pub(crate) struct HullPair<'a> {
     pub polyhedron1: Polyhedron<'a>,
     pub polyhedron2: Polyhedron<'a>,
-    /// Their support maps.
-    pub supports: [Support<'a>; 2],
-    pub pose: Pose,
-    pub margin: Real,
+    /// Rotation and position of hull 2.
+    m: Mat3,
+    t: Vec3,
+    margin: Real,
 }
 
 /// Hull (shape 1) against hull.
 pub(crate) fn hull_hull(
-    a: &ConvexHull,
-    b: &ConvexHull,
+    level: SimdLevel,
+    (a, b): (&ConvexHull, &ConvexHull),
     pose: &Pose,
     margin: Real,
     (cache, manifold): (&mut PairCache, &mut Manifold),
 ) {
-    let (polyhedron1, polyhedron2) = (Polyhedron::from_hull(a), Polyhedron::from_hull(b));
-    let supports = [Support::Hull(a), Support::Hull(b)];
-    HullPair { polyhedron1, polyhedron2, supports, pose: *pose, margin }.collide(cache, manifold);
+    manifold.clear();
+    on_level(level, HullKernel { level, a, b, pose, margin, cache, manifold });
 }
 
 /// Hull (shape 1) against cuboid.
 pub(crate) fn hull_cuboid(
-    a: &ConvexHull,
-    b: &Cuboid,
+    level: SimdLevel,
+    (a, b): (&ConvexHull, &Cuboid),
     pose: &Pose,
     margin: Real,
     (cache, manifold): (&mut PairCache, &mut Manifold),
 ) {
-    let features = CuboidFeatures::new(b);
-    let (polyhedron1, polyhedron2) = (Polyhedron::from_hull(a), features.view());
-    let supports = [Support::Hull(a), Support::Cuboid(*b)];
-    HullPair { polyhedron1, polyhedron2, supports, pose: *pose, margin }.collide(cache, manifold);
+    manifold.clear();
+    on_level(level, CuboidKernel { level, a, b, pose, margin, cache, manifold });
+}
+
+/// Runs a kernel with eight lanes where the level has them.
+#[inline(always)]
+fn on_level<K: Kernel>(level: SimdLevel, kernel: K) {
+    #[cfg(target_arch = "x86_64")]
+    if matches!(level, SimdLevel::Avx2 | SimdLevel::Avx512)
+        && let Some(avx2) = Avx2::detect()
+    {
+        avx2.run(kernel);
+        return;
+    }
+    let _ = level;
+    Baseline.run(kernel);
+}
+
+/// [`hull_hull`]: what most pairs that were apart need, before the search.
+struct HullKernel<'a> {
+    level: SimdLevel,
+    a: &'a ConvexHull,
+    b: &'a ConvexHull,
+    pose: &'a Pose,
+    margin: Real,
+    cache: &'a mut PairCache,
+    manifold: &'a mut Manifold,
+}
+
+impl Kernel for HullKernel<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let (m, t) = (self.pose.rotation.to_mat3(), self.pose.position);
+        let pair = |a, b| HullPair {
+            polyhedron1: Polyhedron::from_hull(a),
+            polyhedron2: Polyhedron::from_hull(b),
+            m,
+            t,
+            margin: self.margin,
+        };
+        let Some(known) = pair(self.a, self.b).touches(self.cache.words[0]) else { return };
+        // Put together anew, so that pairs that are apart need not write down what they do not read.
+        let pair = pair(self.a, self.b);
+        let supports = [Support::Hull(self.a), Support::Hull(self.b)];
+        pair.search(self.level, (self.pose, supports), known, (self.cache, self.manifold));
+    }
+}
+
+/// [`hull_cuboid`]: what most pairs that were apart need, before the search.
+struct CuboidKernel<'a> {
+    level: SimdLevel,
+    a: &'a ConvexHull,
+    b: &'a Cuboid,
+    pose: &'a Pose,
+    margin: Real,
+    cache: &'a mut PairCache,
+    manifold: &'a mut Manifold,
+}
+
+impl Kernel for CuboidKernel<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let features = CuboidFeatures::new(self.b);
+        let pair = HullPair {
+            polyhedron1: Polyhedron::from_hull(self.a),
+            polyhedron2: features.view(),
+            m: self.pose.rotation.to_mat3(),
+            t: self.pose.position,
+            margin: self.margin,
+        };
+        let Some(known) = pair.touches(self.cache.words[0]) else { return };
+        let supports = [Support::Hull(self.a), Support::Cuboid(*self.b)];
+        pair.search(self.level, (self.pose, supports), known, (self.cache, self.manifold));
+    }
+}
+
+/// The search for the best axis and the contact along it.
+struct SearchKernel<'a, const G: usize> {
+    pair: &'a HullPair<'a>,
+    pose: &'a Pose,
+    supports: [Support<'a>; 2],
+    known: Axis,
+    cache: &'a mut PairCache,
+    manifold: &'a mut Manifold,
+}
+
+impl<const G: usize> Kernel for SearchKernel<'_, G> {
+    #[inline(always)]
+    fn run(self) {
+        self.pair.search_faces::<G>((self.pose, self.supports), self.known, (self.cache, self.manifold));
+    }
 }
 
 /// An axis as the cache holds it, and the gap along it.
@@ -95,6 +190,14 @@ struct Axis {
 }
 
 impl Axis {
+    /// None, with a gap below all.
+    const NONE: Self = Self { code: 0, gap: -Real::MAX };
+
+    /// The face of the hull that `owner` stands for, with its gap.
+    fn face_of(self, owner: u32) -> Option<(usize, Real)> {
+        (self.code & EDGES == owner).then(|| (self.index(), self.gap))
+    }
+
     /// The face, for a face axis.
     fn index(self) -> usize {
         (self.code & 0x3FFF_FFFF) as usize
@@ -109,7 +212,6 @@ impl Axis {
 /// An edge with the normals of its faces, all in the frame of hull 1.
 #[derive(Clone, Copy, Default)]
 struct Edge {
-    index: u16,
     start: Vec3,
     along: Vec3,
     left: Vec3,
@@ -117,68 +219,132 @@ struct Edge {
 }
 
 /// The side of a pair seen from one of its hulls: what face queries and clipping need.
-struct View<'a> {
+struct View<'a, const G: usize> {
     own: &'a Polyhedron<'a>,
     other: &'a Polyhedron<'a>,
-    /// Axes and centre of the other hull's frame in the own one.
+    /// Axes and origin of the other hull's frame in the own one.
     m: Mat3,
     t: Vec3,
     /// Height of the other centre over each of the own faces.
-    heights: [Real; MAX_FACES],
+    heights: [[Real; LANES]; G],
 }
+
+/// Some edges of a hull, a bit each.
+type EdgeSet = [u64; MAX_EDGE_WORDS];
 
 /// [`LANES`] edges of hull 2, turned into the frame of hull 1: an edge of hull 1 is tried against all of them at once.
 #[derive(Clone, Copy, Default)]
 struct EdgeGroup {
-    indices: [u16; LANES],
+    indices: [u32; LANES],
+    start: [[Real; LANES]; 3],
     along: [[Real; LANES]; 3],
     left: [[Real; LANES]; 3],
     right: [[Real; LANES]; 3],
 }
 
 impl HullPair<'_> {
-    /// Contacts, in the frame of polyhedron 1.
-    pub(crate) fn collide(&self, cache: &mut PairCache, manifold: &mut Manifold) {
-        manifold.clear();
-        let m = self.pose.rotation.to_mat3();
-        let inverse = m.transpose();
-        let t = self.pose.position;
-        let mut view1 = View::new(&self.polyhedron1, &self.polyhedron2, m, t);
-        let mut view2 = View::new(&self.polyhedron2, &self.polyhedron1, inverse, -(inverse * t));
-        if self.cached_gap(cache.words[0], &view1, &view2) > self.margin {
-            return;
+    /// Nothing if balls around the hulls, or the axis of the last step, show that they are farther apart than the
+    /// margin; else what that axis tells.
+    #[inline(always)]
+    fn touches(&self, code: u32) -> Option<Axis> {
+        let between = self.m * self.polyhedron2.center + self.t - self.polyhedron1.center;
+        let reach = (self.polyhedron1.outer_radius + self.polyhedron2.outer_radius) * (1.0 + BALL_SLACK) + self.margin;
+        if between.length_squared() > reach * reach {
+            return None;
         }
+        let known = self.known_axis(code);
+        // Not `<=`: what is no number is left to the search.
+        if known.gap > self.margin { None } else { Some(known) }
+    }
+
+    /// The axis of the last step with the gap that it has now.
+    #[inline(always)]
+    fn known_axis(&self, code: u32) -> Axis {
+        let axis = Axis { code, gap: -Real::MAX };
+        let (index, (e1, e2)) = (axis.index(), axis.edges());
+        let gap = match code & EDGES {
+            FACE1 if index < self.polyhedron1.planes.len() => {
+                face_gap(self.polyhedron1.planes[index], &self.polyhedron2, &self.m, self.t)
+            }
+            FACE2 if index < self.polyhedron2.planes.len() => {
+                let (inverse, t) = inverted(&self.m, self.t);
+                face_gap(self.polyhedron2.planes[index], &self.polyhedron1, &inverse, t)
+            }
+            // The search names the first half of each edge.
+            EDGES if e1 < self.polyhedron1.edges.len() && e2 < self.polyhedron2.edges.len() && (e1 | e2) & 1 == 0 => {
+                let Some((gap, _)) = self.edge_gap(axis) else { return Axis::NONE };
+                gap
+            }
+            _ => return Axis::NONE,
+        };
+        Axis { code, gap }
+    }
+
+    /// Contacts, in the frame of polyhedron 1; no axis is known to part the hulls.
+    #[inline(always)]
+    fn search(
+        &self,
+        level: SimdLevel,
+        (pose, supports): (&Pose, [Support; 2]),
+        known: Axis,
+        (cache, manifold): (&mut PairCache, &mut Manifold),
+    ) {
+        let groups = self.polyhedron1.faces.len().max(self.polyhedron2.faces.len());
+        let pair = self;
+        // Many faces are rare: only they pay for clearing large buffers.
+        if groups <= FEW_FACE_GROUPS {
+            on_level(level, SearchKernel::<FEW_FACE_GROUPS> { pair, pose, supports, known, cache, manifold });
+        } else {
+            on_level(level, SearchKernel::<MAX_FACE_GROUPS> { pair, pose, supports, known, cache, manifold });
+        }
+    }
+
+    #[inline(always)]
+    fn search_faces<const G: usize>(
+        &self,
+        (pose, supports): (&Pose, [Support; 2]),
+        known: Axis,
+        (cache, manifold): (&mut PairCache, &mut Manifold),
+    ) {
+        let (inverse, t) = inverted(&self.m, self.t);
+        let view1 = View::<G>::new(&self.polyhedron1, &self.polyhedron2, self.m, self.t);
+        let view2 = View::<G>::new(&self.polyhedron2, &self.polyhedron1, inverse, t);
         let size = min(self.polyhedron1.size, self.polyhedron2.size);
-        view1.measure_heights();
-        view2.measure_heights();
-        let face = self.best_face(&view1, &view2, size);
+        let face = self.best_face(&view1, &view2, known, size);
         cache.words[0] = face.code;
         if face.gap > self.margin {
             return;
         }
-        let edges = self.best_edges(&view1, &view2, face.gap + EDGE_GAIN * size);
+        let edges = self.best_edges(&view1, &view2, known, face.gap + EDGE_GAIN * size);
         if let Some(edges) = edges {
             cache.words[0] = edges.code;
             if edges.gap > self.margin {
                 return;
             }
         }
-        if edges.is_none_or(|edges| self.is_aligned(edges, face, &m)) {
+        if edges.is_none_or(|edges| self.is_aligned(edges, face)) {
             self.face_contact(face, (&view1, &view2), size, manifold);
         }
         if let Some(edges) = edges
             && !stands_in(manifold, edges.gap - EDGE_BIAS * size)
         {
             manifold.clear();
-            self.edge_contact(edges, &m, manifold);
+            self.edge_contact(edges, manifold);
         }
         if manifold.points().is_empty() {
-            self.passing_by(face, &view1, &view2, manifold);
+            self.passing_by(face, (pose, supports), manifold);
         }
     }
 
     /// Clips the incident face of one hull against the reference face of the other.
-    fn face_contact(&self, face: Axis, (view1, view2): (&View, &View), size: Real, manifold: &mut Manifold) {
+    #[inline(always)]
+    fn face_contact<const G: usize>(
+        &self,
+        face: Axis,
+        (view1, view2): (&View<G>, &View<G>),
+        size: Real,
+        manifold: &mut Manifold,
+    ) {
         if face.code & EDGES == FACE1 {
             view1.face_contact(face.index(), (self.margin, size), manifold);
             return;
@@ -193,71 +359,53 @@ impl HullPair<'_> {
     }
 
     /// Whether the axis of a pair of edges is almost the normal of a face.
-    fn is_aligned(&self, edges: Axis, face: Axis, m: &Mat3) -> bool {
+    #[inline(always)]
+    fn is_aligned(&self, edges: Axis, face: Axis) -> bool {
         let normal = if face.code & EDGES == FACE1 {
             self.polyhedron1.planes[face.index()].normal
         } else {
-            -(*m * self.polyhedron2.planes[face.index()].normal)
+            -(self.m * self.polyhedron2.planes[face.index()].normal)
         };
-        self.edge_gap(edges, m).is_some_and(|(_, axis)| axis.dot(normal) > ALIGNED)
+        self.edge_gap(edges).is_some_and(|(_, axis)| axis.dot(normal) > ALIGNED)
     }
 
     /// Gap and normal of a pair of edges that makes a face of the Minkowski difference.
-    fn edge_gap(&self, edges: Axis, m: &Mat3) -> Option<(Real, Vec3)> {
+    #[inline(always)]
+    fn edge_gap(&self, edges: Axis) -> Option<(Real, Vec3)> {
         let (e1, e2) = edges.edges();
-        Edge::new(&self.polyhedron1, e1).gap(&Edge::new(&self.polyhedron2, e2).placed(m, self.pose.position))
-    }
-
-    /// The gap along the axis of the last step: above the margin only if the hulls are apart along it.
-    fn cached_gap(&self, code: u32, view1: &View, view2: &View) -> Real {
-        let axis = Axis { code, gap: 0.0 };
-        let (index, (e1, e2)) = (axis.index(), axis.edges());
-        match code & EDGES {
-            FACE1 if index < self.polyhedron1.planes.len() => view1.face_gap(index),
-            FACE2 if index < self.polyhedron2.planes.len() => view2.face_gap(index),
-            EDGES if e1 < self.polyhedron1.edges.len() && e2 < self.polyhedron2.edges.len() => {
-                self.edge_gap(axis, &view1.m).map_or(-Real::MAX, |(gap, _)| gap)
-            }
-            _ => -Real::MAX,
-        }
+        Edge::new(&self.polyhedron1, e1).gap(&Edge::new(&self.polyhedron2, e2).placed(&self.m, self.t))
     }
 
     /// The face to build the contact on, or one along which the hulls are apart by more than the margin.
-    fn best_face(&self, view1: &View, view2: &View, size: Real) -> Axis {
-        let (face, gap) = view1.best_face(-Real::MAX);
+    #[inline(always)]
+    fn best_face<const G: usize>(&self, view1: &View<G>, view2: &View<G>, known: Axis, size: Real) -> Axis {
+        let (face, gap) = view1.best_face(known.face_of(FACE1), -Real::MAX);
         let best = Axis { code: FACE1 | face as u32, gap };
         if gap > self.margin {
             return best;
         }
         let floor = gap + FACE_BIAS * size;
-        let (face, gap) = view2.best_face(floor);
+        let (face, gap) = view2.best_face(known.face_of(FACE2), floor);
         if gap > floor { Axis { code: FACE2 | face as u32, gap } } else { best }
     }
 
-    /// The edge pair with the largest gap, if that is above `floor`.
-    fn best_edges(&self, view1: &View, view2: &View, floor: Real) -> Option<Axis> {
-        let mut list1 = [0u16; MAX_EDGES];
-        let mut list2 = [0u16; MAX_EDGES];
-        let count1 = view1.promising_edges(floor, &mut list1);
-        let count2 = view2.promising_edges(floor, &mut list2);
-        let m = self.pose.rotation.to_mat3();
+    /// The edge pair with the largest gap, if that is above `floor`; of several the one with the lowest code.
+    #[inline(always)]
+    fn best_edges<const G: usize>(&self, view1: &View<G>, view2: &View<G>, known: Axis, floor: Real) -> Option<Axis> {
         let mut best = Axis { code: 0, gap: floor };
-        for indices in list2[..count2].chunks(BATCH) {
-            let mut groups = [EdgeGroup::default(); BATCH / LANES];
-            for (group, indices) in groups.iter_mut().zip(indices.chunks(LANES)) {
-                group.fill(&self.polyhedron2, indices, &m);
-            }
-            for &index in &list1[..count1] {
-                let edge1 = Edge::new(&self.polyhedron1, index as usize);
-                for group in &groups[..indices.len().div_ceil(LANES)] {
-                    group.for_each_crossing(&edge1, |index2| {
-                        let edge2 = Edge::new(&self.polyhedron2, index2 as usize).placed(&m, self.pose.position);
-                        if let Some((gap, _)) = edge1.gap(&edge2)
-                            && gap > best.gap
-                        {
-                            best = Axis { code: EDGES | u32::from(index) << 15 | u32::from(index2), gap };
-                        }
-                    });
+        if known.code & EDGES == EDGES && known.gap > floor {
+            best = known;
+        }
+        let (set1, mut set2) = (view1.promising_edges(best.gap), view2.promising_edges(best.gap));
+        let words = self.polyhedron1.edges.len().div_ceil(128).min(MAX_EDGE_WORDS);
+        let mut group = EdgeGroup::default();
+        while group.fill(&mut set2, &self.polyhedron2, (&self.m, self.t)) {
+            for (word, &bits) in set1[..words].iter().enumerate() {
+                let mut bits = bits;
+                while bits != 0 {
+                    let index1 = 64 * word as u32 + bits.trailing_zeros();
+                    bits &= bits - 1;
+                    group.improve(index1, &Edge::new(&self.polyhedron1, 2 * index1 as usize), &mut best);
                 }
             }
         }
@@ -265,10 +413,11 @@ impl HullPair<'_> {
     }
 
     /// Closest points of the two edges; nothing if the hulls are apart and the edges are closest beyond their ends.
-    fn edge_contact(&self, edges: Axis, m: &Mat3, manifold: &mut Manifold) {
+    #[inline(always)]
+    fn edge_contact(&self, edges: Axis, manifold: &mut Manifold) {
         let (e1, e2) = edges.edges();
         let edge1 = Edge::new(&self.polyhedron1, e1);
-        let edge2 = Edge::new(&self.polyhedron2, e2).placed(m, self.pose.position);
+        let edge2 = Edge::new(&self.polyhedron2, e2).placed(&self.m, self.t);
         let Some((separation, normal)) = edge1.gap(&edge2) else { return };
         let (d1, d2, w) = (edge1.along, edge2.along, edge2.start - edge1.start);
         let (a11, a12, a22) = (d1.dot(d1), d1.dot(d2), d2.dot(d2));
@@ -285,9 +434,10 @@ impl HullPair<'_> {
 
     /// Hulls that pass each other with no corner over the other's face: the closest points, or the deepest corner.
     #[cold]
-    fn passing_by(&self, axis: Axis, view1: &View, view2: &View, manifold: &mut Manifold) {
+    #[inline(never)]
+    fn passing_by(&self, axis: Axis, (pose, supports): (&Pose, [Support; 2]), manifold: &mut Manifold) {
         let feature = 0x2000_0000;
-        if let Some(c) = closest(&self.supports[0], &self.supports[1], &self.pose) {
+        if let Some(c) = closest(&supports[0], &supports[1], pose) {
             if c.distance <= self.margin {
                 manifold.push(ManifoldPoint { point1: c.point1, normal: c.normal, separation: c.distance, feature });
             }
@@ -296,12 +446,15 @@ impl HullPair<'_> {
         let index = axis.index();
         if axis.code & EDGES == FACE1 {
             let normal = self.polyhedron1.planes[index].normal;
-            let point1 = view1.lowest_corner(normal) - normal * axis.gap;
+            let corner = self.polyhedron2.lowest_corner(transposed_mul(&self.m, normal));
+            let point1 = self.m * self.polyhedron2.vertices[corner] + self.t - normal * axis.gap;
             manifold.push(ManifoldPoint { point1, normal, separation: axis.gap, feature });
         } else {
             let normal2 = self.polyhedron2.planes[index].normal;
-            let point1 = self.pose.transform_point(view2.lowest_corner(normal2));
-            let normal = -self.pose.rotation.rotate(normal2);
+            let (inverse, t) = inverted(&self.m, self.t);
+            let corner = self.polyhedron1.lowest_corner(transposed_mul(&inverse, normal2));
+            let point1 = pose.transform_point(inverse * self.polyhedron1.vertices[corner] + t);
+            let normal = -pose.rotation.rotate(normal2);
             manifold.push(ManifoldPoint { point1, normal, separation: axis.gap, feature });
         }
     }
@@ -313,7 +466,6 @@ impl Edge {
         let (start, end) = polyhedron.edge_points(index);
         let normal = |e: HalfEdge| polyhedron.planes[e.face as usize].normal;
         Self {
-            index: index as u16,
             start,
             along: end - start,
             left: normal(polyhedron.edges[index]),
@@ -321,14 +473,9 @@ impl Edge {
         }
     }
 
+    #[inline(always)]
     fn placed(&self, m: &Mat3, t: Vec3) -> Self {
-        Self {
-            index: self.index,
-            start: *m * self.start + t,
-            along: *m * self.along,
-            left: *m * self.left,
-            right: *m * self.right,
-        }
+        Self { start: *m * self.start + t, along: *m * self.along, left: *m * self.left, right: *m * self.right }
     }
 
     /// Gap and normal of a pair of edges whose arcs cross; `self` is of hull 1.
@@ -340,143 +487,240 @@ impl Edge {
         if !((c * d < 0.0) & (a * b < 0.0) & (c * b < 0.0)) {
             return None;
         }
-        let cross = self.along.cross(other.along);
+        self.gap_of_crossing(other.start, other.along)
+    }
+
+    /// Gap and normal of a pair of edges whose arcs are known to cross.
+    #[inline(always)]
+    fn gap_of_crossing(&self, start: Vec3, along: Vec3) -> Option<(Real, Vec3)> {
+        let cross = self.along.cross(along);
         let squared = cross.length_squared();
-        if squared <= PARALLEL * self.along.length_squared() * other.along.length_squared() {
+        if squared <= PARALLEL * self.along.length_squared() * along.length_squared() {
             return None;
         }
         let normal = normalize_or(cross, self.left);
         let normal = if normal.dot(self.left + self.right) < 0.0 { -normal } else { normal };
-        Some((normal.dot(other.start - self.start), normal))
+        Some((normal.dot(start - self.start), normal))
     }
 }
 
 impl EdgeGroup {
-    /// Lanes past the last edge keep their zeros, which never cross.
-    fn fill(&mut self, polyhedron: &Polyhedron, indices: &[u16], m: &Mat3) {
-        for (k, &index) in indices.iter().enumerate() {
-            let edge = Edge::new(polyhedron, index as usize);
-            self.indices[k] = index;
-            let lists = [&mut self.along, &mut self.left, &mut self.right];
-            for (list, v) in lists.into_iter().zip([edge.along, edge.left, edge.right]) {
-                let v = *m * v;
-                (list[0][k], list[1][k], list[2][k]) = (v.x, v.y, v.z);
+    /// Takes up to [`LANES`] edges out of a set; false if there is none left.
+    #[inline(always)]
+    fn fill(&mut self, set: &mut EdgeSet, polyhedron: &Polyhedron, (m, t): (&Mat3, Vec3)) -> bool {
+        let words = polyhedron.edges.len().div_ceil(128).min(MAX_EDGE_WORDS);
+        let mut count = 0;
+        for (word, bits) in set[..words].iter_mut().enumerate() {
+            while *bits != 0 && count < LANES {
+                let index = 64 * word as u32 + bits.trailing_zeros();
+                *bits &= *bits - 1;
+                let edge = Edge::new(polyhedron, 2 * index as usize);
+                self.indices[count] = index;
+                let lists = [&mut self.start, &mut self.along, &mut self.left, &mut self.right];
+                for (list, v) in lists.into_iter().zip([edge.start, edge.along, edge.left, edge.right]) {
+                    (list[0][count], list[1][count], list[2][count]) = (v.x, v.y, v.z);
+                }
+                count += 1;
             }
         }
+        if count == 0 {
+            return false;
+        }
+        // No normals, no arcs: what is left over from the last group never crosses.
+        for lane in count..LANES {
+            for list in [&mut self.left, &mut self.right] {
+                (list[0][lane], list[1][lane], list[2][lane]) = (0.0, 0.0, 0.0);
+            }
+        }
+        turn(&mut self.start, m);
+        turn(&mut self.along, m);
+        turn(&mut self.left, m);
+        turn(&mut self.right, m);
+        for k in 0..LANES {
+            self.start[0][k] += t.x;
+            self.start[1][k] += t.y;
+            self.start[2][k] += t.z;
+        }
+        true
     }
 
-    /// Calls back with each edge whose arc crosses that of `edge`.
+    /// Puts in the place of `best` what has a larger gap.
     #[inline(always)]
-    fn for_each_crossing(&self, edge: &Edge, mut found: impl FnMut(u16)) {
+    fn improve(&self, index1: u32, edge: &Edge, best: &mut Axis) {
         let (c, d) = (dots(edge.along, &self.left), dots(edge.along, &self.right));
         let (a, b) = (dots(edge.left, &self.along), dots(edge.right, &self.along));
         let mut sign = [0.0; LANES];
         for k in 0..LANES {
             sign[k] = max(max(c[k] * d[k], a[k] * b[k]), c[k] * b[k]);
         }
-        for (k, &sign) in sign.iter().enumerate() {
-            if sign < 0.0 {
-                found(self.indices[k]);
+        let mut bits = negatives(&sign);
+        while bits != 0 {
+            let k = bits.trailing_zeros() as usize;
+            bits &= bits - 1;
+            // Not so for a negative zero.
+            if sign[k] < 0.0 {
+                let take = |list: &[[Real; LANES]; 3]| Vec3::new(list[0][k], list[1][k], list[2][k]);
+                let Some((gap, _)) = edge.gap_of_crossing(take(&self.start), take(&self.along)) else { continue };
+                let code = EDGES | index1 << 16 | self.indices[k] << 1;
+                if gap > best.gap || (gap == best.gap && code < best.code) {
+                    *best = Axis { code, gap };
+                }
             }
         }
     }
+}
+
+/// `m v` for each lane.
+#[inline(always)]
+fn turn(v: &mut [[Real; LANES]; 3], m: &Mat3) {
+    let [x, y, z] = *v;
+    for (axis, list) in v.iter_mut().enumerate() {
+        let (a, b, c) = (m.x_axis[axis], m.y_axis[axis], m.z_axis[axis]);
+        *list = std::array::from_fn(|k| a * x[k] + b * y[k] + c * z[k]);
+    }
+}
+
+/// `mᵀ v`: the direction `v` in the frame whose axes are the columns of `m`.
+#[inline(always)]
+fn transposed_mul(m: &Mat3, v: Vec3) -> Vec3 {
+    Vec3::new(m.x_axis.dot(v), m.y_axis.dot(v), m.z_axis.dot(v))
+}
+
+/// The placement of hull 1 in the frame of hull 2.
+#[inline(always)]
+fn inverted(m: &Mat3, t: Vec3) -> (Mat3, Vec3) {
+    let inverse = m.transpose();
+    (inverse, -(inverse * t))
+}
+
+/// Height of the other hull, placed by `m` and `t`, over a plane.
+#[inline(always)]
+fn face_gap(plane: Plane, other: &Polyhedron, m: &Mat3, t: Vec3) -> Real {
+    other.lowest(transposed_mul(m, plane.normal)) + plane.normal.dot(t) - plane.offset
 }
 
 /// `u · v` for each lane.
 #[inline(always)]
 fn dots(u: Vec3, v: &[[Real; LANES]; 3]) -> [Real; LANES] {
-    let mut sum = [0.0; LANES];
-    for k in 0..LANES {
-        sum[k] = u.x * v[0][k] + u.y * v[1][k] + u.z * v[2][k];
-    }
-    sum
+    std::array::from_fn(|k| u.x * v[0][k] + u.y * v[1][k] + u.z * v[2][k])
 }
 
-impl<'a> View<'a> {
+impl<'a, const G: usize> View<'a, G> {
+    #[inline(always)]
     fn new(own: &'a Polyhedron<'a>, other: &'a Polyhedron<'a>, m: Mat3, t: Vec3) -> Self {
-        Self { own, other, m, t, heights: [0.0; MAX_FACES] }
+        let mut heights = [[0.0; LANES]; G];
+        let center = m * other.center + t;
+        for (height, face) in heights.iter_mut().zip(own.faces) {
+            *height = std::array::from_fn(|k| {
+                face.x[k] * center.x + face.y[k] * center.y + face.z[k] * center.z - face.offset[k]
+            });
+        }
+        Self { own, other, m, t, heights }
     }
 
-    fn measure_heights(&mut self) {
-        let center = self.m * self.other.center + self.t;
-        for (height, plane) in self.heights.iter_mut().zip(self.own.planes) {
-            *height = plane.normal.dot(center) - plane.offset;
-        }
+    #[inline(always)]
+    fn height(&self, face: usize) -> Real {
+        self.heights[face / LANES][face % LANES]
     }
 
     /// Height of the other hull over the plane of a face.
+    #[inline(always)]
     fn face_gap(&self, face: usize) -> Real {
-        let plane = self.own.planes[face];
-        let n = plane.normal;
-        let local = Vec3::new(self.m.x_axis.dot(n), self.m.y_axis.dot(n), self.m.z_axis.dot(n));
-        lowest(self.other.vertices, local) + n.dot(self.t) - plane.offset
+        face_gap(self.own.planes[face], self.other, &self.m, self.t)
     }
 
-    /// The first face with the largest gap; faces that cannot reach `floor` are not looked at.
-    fn best_face(&self, floor: Real) -> (usize, Real) {
-        let heights = &self.heights[..self.own.planes.len()];
-        // The face that the other centre is highest above is most often the one: its gap prunes the others.
-        let mut first = 0;
-        for (face, &height) in heights.iter().enumerate() {
-            if height > heights[first] {
-                first = face;
+    /// The face that the other centre is highest above, most often the best one; of several, the first.
+    #[inline(always)]
+    fn highest(&self) -> usize {
+        let heights = &self.heights[..self.own.faces.len()];
+        let mut running = [-Real::MAX; LANES];
+        for group in heights {
+            for k in 0..LANES {
+                running[k] = max(group[k], running[k]);
             }
         }
-        let radius = self.other.inner_radius * (1.0 - 1e-4);
-        if heights[first] - radius < floor {
-            return (first, -Real::MAX);
-        }
-        let (mut best, mut gap) = (first, self.face_gap(first));
-        for (face, &height) in heights.iter().enumerate() {
-            if face == first || height - radius < max(gap, floor) {
-                continue;
+        let highest = running.iter().fold(-Real::MAX, |highest, &height| max(height, highest));
+        for (index, group) in heights.iter().enumerate() {
+            let lower = negatives(&std::array::from_fn(|k| group[k] - highest));
+            if lower != ALL_LANES {
+                let face = index * LANES + (!lower).trailing_zeros() as usize;
+                return if face < self.own.planes.len() { face } else { 0 };
             }
-            let g = self.face_gap(face);
-            if g > gap || (g == gap && face < best) {
-                (best, gap) = (face, g);
+        }
+        0
+    }
+
+    /// The first face with the largest gap; faces that cannot reach `floor` are not looked at. A face whose gap is
+    /// known prunes the others from the start.
+    #[inline(always)]
+    fn best_face(&self, known: Option<(usize, Real)>, floor: Real) -> (usize, Real) {
+        let radius = self.other.inner_radius * (1.0 - BALL_SLACK);
+        let (first, mut gap) = if let Some(known) = known {
+            known
+        } else {
+            let first = self.highest();
+            (first, if self.height(first) - radius < floor { -Real::MAX } else { self.face_gap(first) })
+        };
+        let mut best = first;
+        for (group, heights) in self.heights[..self.own.faces.len()].iter().enumerate() {
+            let bound = max(gap, floor);
+            let mut bits = ALL_LANES & !negatives(&std::array::from_fn(|k| heights[k] - radius - bound));
+            while bits != 0 {
+                let lane = bits.trailing_zeros() as usize;
+                bits &= bits - 1;
+                let face = group * LANES + lane;
+                if face == first || heights[lane] - radius < max(gap, floor) || face >= self.own.planes.len() {
+                    continue;
+                }
+                let g = self.face_gap(face);
+                if g > gap || (g == gap && face < best) {
+                    (best, gap) = (face, g);
+                }
             }
         }
         (best, gap)
     }
 
-    /// Lists the edges (one half of each) that can have a gap above `floor`.
-    fn promising_edges(&self, floor: Real, list: &mut [u16; MAX_EDGES]) -> usize {
-        let limit = floor + self.other.inner_radius * (1.0 - 1e-4);
-        let planes = self.own.planes;
-        let mut count = 0;
-        for (pair, twins) in self.own.edges.as_chunks::<2>().0.iter().enumerate() {
-            // The start of the edge is on both planes, so `n · (m − v)` is the height over the plane.
-            let [left, right] = twins.map(|e| e.face as usize);
-            let highest = max(self.heights[left], self.heights[right]);
-            // `highest / cos(half the arc) < limit`, with `cos² = (1 + left · right) / 2`, both sides positive.
-            let cosine_squared = 0.5 * (1.0 + planes[left].normal.dot(planes[right].normal));
-            let rises = (highest > 0.0) & (highest * highest >= limit * limit * cosine_squared);
-            // Written always, counted if it may matter: whether it does is hard to foretell. There is room for all
-            // edges.
-            list[count.min(MAX_EDGES - 1)] = 2 * pair as u16;
-            count += ((highest >= limit) | rises) as usize;
-        }
-        count.min(MAX_EDGES)
-    }
-
-    /// The first corner of the other hull that lies lowest along `normal`, in the own frame.
-    fn lowest_corner(&self, normal: Vec3) -> Vec3 {
-        let mut best = self.m * self.other.vertices[0] + self.t;
-        for &vertex in &self.other.vertices[1..] {
-            let p = self.m * vertex + self.t;
-            if p.dot(normal) < best.dot(normal) {
-                best = p;
+    /// The edges that can have a gap of `floor` or more: see the top of this file.
+    #[inline(always)]
+    fn promising_edges(&self, floor: Real) -> EdgeSet {
+        let limit = floor + self.other.inner_radius * (1.0 - BALL_SLACK);
+        let squared = limit * limit;
+        let mut set = [0; MAX_EDGE_WORDS];
+        for (group, (heights, faces)) in self.heights.iter().zip(self.own.faces).enumerate() {
+            // A face whose height `h` is below the limit reaches it on no arc to a lower face if `h / cos(half the
+            // arc)` does not: then both differences are negative.
+            let short = std::array::from_fn(|k| heights[k] - limit);
+            let flat = std::array::from_fn(|k| {
+                if heights[k] > 0.0 { heights[k] * heights[k] - squared * faces.cosine_squared[k] } else { -1.0 }
+            });
+            let mut bits = ALL_LANES & !(negatives(&short) & negatives(&flat));
+            while bits != 0 {
+                let face = group * LANES + bits.trailing_zeros() as usize;
+                bits &= bits - 1;
+                if face >= self.own.planes.len() {
+                    break; // padding, which only a pose that is no number can reach
+                }
+                // The edge is met from the higher of its faces.
+                let height = self.height(face);
+                for border in self.own.border(face) {
+                    let rises = (height > 0.0) & (height * height >= squared * border.cosine_squared);
+                    set[border.edge as usize / 64] |= u64::from((height >= limit) | rises) << (border.edge % 64);
+                }
             }
         }
-        best
+        set
     }
 
     /// Clips the incident face against the reference face; the manifold is in the own frame.
+    #[inline(always)]
     fn face_contact(&self, face: usize, reach: (Real, Real), manifold: &mut Manifold) {
         let incident = self.incident_face(self.own.planes[face].normal);
         let corners = self.own.face_loop(face).count() + self.other.face_loop(incident).count();
         // Each plane adds at most one corner. Large faces are rare: only they pay for clearing large buffers.
-        if corners <= 24 {
+        if corners <= 8 {
+            self.clip_faces::<8>(face, incident, reach, manifold);
+        } else if corners <= 24 {
             self.clip_faces::<24>(face, incident, reach, manifold);
         } else {
             self.clip_faces::<512>(face, incident, reach, manifold);
@@ -487,23 +731,16 @@ impl<'a> View<'a> {
     ///
     /// Among all faces it would be the wrong one where two faces meet almost flat: the one that looks straighter down may
     /// end at the edge between them, with the deepest corner on the other one.
+    #[inline(always)]
     fn incident_face(&self, normal: Vec3) -> usize {
-        let n = Vec3::new(self.m.x_axis.dot(normal), self.m.y_axis.dot(normal), self.m.z_axis.dot(normal));
-        let mut lowest = 0;
-        let mut height = self.other.vertices[0].dot(n);
-        for (vertex, position) in self.other.vertices.iter().enumerate().skip(1) {
-            let h = position.dot(n);
-            if h < height {
-                (lowest, height) = (vertex, h);
-            }
-        }
+        let n = transposed_mul(&self.m, normal);
         let mut best = 0;
         let mut cosine = Real::MAX;
-        for edge in self.other.edges.iter().filter(|edge| edge.origin as usize == lowest) {
-            let c = self.other.planes[edge.face as usize].normal.dot(n);
+        for &face in self.other.faces_around(self.other.lowest_corner(n)) {
+            let c = self.other.planes[face as usize].normal.dot(n);
             // Clearly more, so that of two faces at the same angle the first one stays.
             if c < cosine - 1e-3 {
-                (best, cosine) = (edge.face as usize, c);
+                (best, cosine) = (face as usize, c);
             }
         }
         best
@@ -517,7 +754,9 @@ impl<'a> View<'a> {
         manifold: &mut Manifold,
     ) {
         let plane = self.own.planes[face];
-        let (mut front, mut back) = ([ClipPoint::default(); N], [ClipPoint::default(); N]);
+        let mut buffers = [[ClipPoint::default(); N]; 2];
+        let [front, back] = &mut buffers;
+        let (mut front, mut back) = (front, back);
         let mut count = 0;
         for edge in self.other.face_loop(incident) {
             let position = self.m * self.other.vertices[self.other.edges[edge].origin as usize] + self.t;
@@ -526,8 +765,8 @@ impl<'a> View<'a> {
             count += 1;
         }
         for (cut, edge) in self.own.face_loop(face).enumerate() {
-            let (out, offset) = self.own.side_plane(edge, plane.normal);
-            count = clip_polygon(&front[..count], (out, offset + GROWTH * size), cut as u32, &mut back);
+            let (out, offset) = self.own.side_plane(edge);
+            count = clip_polygon(&front[..count], (out, offset + GROWTH * size), cut as u32, back);
             std::mem::swap(&mut front, &mut back);
         }
         let mut kept = 0;
@@ -552,18 +791,5 @@ impl<'a> View<'a> {
     }
 }
 
-/// The lowest value of `direction · v` over the corners.
-fn lowest(vertices: &[Vec3], direction: Vec3) -> Real {
-    // Four running minima, as one would wait for itself at each corner.
-    let mut running = [Real::MAX; 4];
-    let chunks = vertices.chunks_exact(4);
-    for (k, &v) in chunks.remainder().iter().enumerate() {
-        running[k] = direction.dot(v);
-    }
-    for chunk in chunks {
-        for k in 0..4 {
-            running[k] = min(direction.dot(chunk[k]), running[k]);
-        }
-    }
-    min(min(running[0], running[1]), min(running[2], running[3]))
-}
+#[cfg(test)]
+mod tests;

@@ -35,6 +35,7 @@ pub use manifold::{Manifold, ManifoldPoint};
 
 use crate::math::{Pose, Real};
 use crate::shape::Shape;
+use crate::simd::SimdLevel;
 
 /// What a pair remembers between steps to find its contact faster: the last separating or reference feature.
 ///
@@ -73,10 +74,22 @@ pub fn collide(
     cache: &mut PairCache,
     manifold: &mut Manifold,
 ) {
+    collide_on(SimdLevel::best(), (shape1, shape2), pose, margin, (cache, manifold));
+}
+
+/// [`collide`] with the instructions of a level; the result is the same bits for all.
+#[inline(always)]
+pub(crate) fn collide_on(
+    level: SimdLevel,
+    (shape1, shape2): (&Shape, &Shape),
+    pose: &Pose,
+    margin: Real,
+    (cache, manifold): (&mut PairCache, &mut Manifold),
+) {
     if rank(shape1) >= rank(shape2) {
-        collide_sorted(shape1, shape2, pose, margin, cache, manifold);
+        collide_sorted(level, (shape1, shape2), pose, margin, (cache, manifold));
     } else {
-        collide_sorted(shape2, shape1, &pose.inverse(), margin, cache, manifold);
+        collide_sorted(level, (shape2, shape1), &pose.inverse(), margin, (cache, manifold));
         mirror(pose, manifold);
     }
 }
@@ -95,12 +108,11 @@ fn rank(shape: &Shape) -> u8 {
 
 #[inline(always)]
 fn collide_sorted(
-    shape1: &Shape,
-    shape2: &Shape,
+    level: SimdLevel,
+    (shape1, shape2): (&Shape, &Shape),
     pose: &Pose,
     margin: Real,
-    cache: &mut PairCache,
-    manifold: &mut Manifold,
+    (cache, manifold): (&mut PairCache, &mut Manifold),
 ) {
     match (shape1, shape2) {
         (Shape::Cuboid(a), Shape::Cuboid(b)) => cuboid::cuboid_cuboid(a, b, pose, margin, cache, manifold),
@@ -111,8 +123,8 @@ fn collide_sorted(
         (Shape::Cuboid(a), Shape::Capsule(b)) => capsule::cuboid_capsule(a, b, pose, margin, manifold),
         (Shape::Hull(a), Shape::Sphere(b)) => sphere::hull_sphere(a, b, pose, margin, manifold),
         (Shape::Hull(a), Shape::Capsule(b)) => capsule::hull_capsule(a, b, pose, margin, manifold),
-        (Shape::Hull(a), Shape::Cuboid(b)) => hull::hull_cuboid(a, b, pose, margin, (cache, manifold)),
-        (Shape::Hull(a), Shape::Hull(b)) => hull::hull_hull(a, b, pose, margin, (cache, manifold)),
+        (Shape::Hull(a), Shape::Cuboid(b)) => hull::hull_cuboid(level, (a, b), pose, margin, (cache, manifold)),
+        (Shape::Hull(a), Shape::Hull(b)) => hull::hull_hull(level, (a, b), pose, margin, (cache, manifold)),
         (Shape::Mesh(_), Shape::Mesh(_)) => manifold.clear(),
         (Shape::Mesh(a), convex) => mesh::collide(a, convex, pose, margin, cache, manifold),
         _ => manifold.clear(),

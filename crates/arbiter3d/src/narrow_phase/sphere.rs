@@ -70,7 +70,7 @@ pub(crate) fn hull_sphere(a: &ConvexHull, b: &Sphere, pose: &Pose, margin: Real,
     }
     let normal = polyhedron.planes[face].normal;
     let over = |edge| {
-        let (out, offset) = polyhedron.side_plane(edge, normal);
+        let (out, offset) = polyhedron.side_plane(edge);
         out.dot(c) <= offset
     };
     if height > 0.0

@@ -172,7 +172,7 @@ fn random_hull(random: &mut Random, count: usize, size: Real) -> Shape {
 }
 
 /// The largest gap of two convex polyhedra over all face normals and all products of edges, by brute force.
-fn hull_oracle(a: &ConvexHull, b: &ConvexHull, pose: &Pose) -> f64 {
+pub(super) fn hull_oracle(a: &ConvexHull, b: &ConvexHull, pose: &Pose) -> f64 {
     let (m, t) = (matrix(pose.rotation), pose.position.as_dvec3());
     let v1: Vec<DVec3> = a.vertices().iter().map(|v| v.as_dvec3()).collect();
     let v2: Vec<DVec3> = b.vertices().iter().map(|v| m * v.as_dvec3() + t).collect();

@@ -404,7 +404,7 @@ impl Pair<'_> {
         let plane = self.solid.planes[face];
         let mut ends = [[0.0, 1.0]; 3];
         for solid_edge in self.solid.face_loop(face) {
-            let (side, offset) = self.solid.side_plane(solid_edge, plane.normal);
+            let (side, offset) = self.solid.side_plane(solid_edge);
             let distance = self.triangle.corners.map(|corner| offset + self.triangle.slack - side.dot(corner));
             for (i, ends) in ends.iter_mut().enumerate() {
                 let (da, db) = (distance[i], distance[(i + 1) % 3]);
@@ -474,7 +474,7 @@ impl Pair<'_> {
         }
         let mut ends = [0.0, 1.0];
         for side_edge in self.solid.face_loop(face) {
-            let (side, offset) = self.solid.side_plane(side_edge, plane.normal);
+            let (side, offset) = self.solid.side_plane(side_edge);
             let (da, db) = (offset - side.dot(a), offset - side.dot(b));
             if da < 0.0 && db < 0.0 {
                 return 0;

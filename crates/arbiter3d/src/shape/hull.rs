@@ -22,6 +22,7 @@
 //! starts at its lowest vertex, and the faces are sorted: the same points give the same hull, bit for bit.
 
 use super::hull_builder::{Lattice, TriangulatedHull};
+use super::hull_features::{HullFeatures, LANES};
 use super::hull_merge::{Outline, simplify, triangles_as_outlines};
 use super::{MassProperties, ShapeError, positive};
 use crate::math::{Aabb, Real, SymmetricMat3, Vec3};
@@ -33,9 +34,6 @@ const MAX_VERTICES: usize = 255;
 
 /// How many vertices are tried, before the ones that are no corners go, until a hull counts as too large.
 const MAX_TRIED_VERTICES: usize = 4 * MAX_VERTICES;
-
-/// Lanes of the vertex arrays.
-const LANES: usize = 8;
 
 /// Squared sine below which two edges count as parallel (about 0.06°).
 const PARALLEL: f64 = 1e-6;
@@ -95,8 +93,7 @@ pub struct ConvexHull {
     face_edges: Vec<u16>,
     edges: Vec<HalfEdge>,
     edge_directions: Vec<Vec3>,
-    /// The vertices' x, y and z, padded with the first vertex to whole groups of eight.
-    lanes: [Vec<Real>; 3],
+    features: HullFeatures,
     aabb: Aabb,
     inner_radius: Real,
     unit_mass: MassProperties,
@@ -244,13 +241,12 @@ impl ConvexHull {
     #[inline]
     #[must_use]
     pub fn support(&self, direction: Vec3) -> (usize, Vec3) {
-        let [xs, ys, zs] = self.lanes();
         let mut best = [-Real::INFINITY; LANES];
         let mut found = [0_u32; LANES];
-        let groups = xs.chunks_exact(LANES).zip(ys.chunks_exact(LANES)).zip(zs.chunks_exact(LANES));
-        for (group, ((x, y), z)) in groups.enumerate() {
+        for (group, corners) in self.features.corners.iter().enumerate() {
             for lane in 0..LANES {
-                let reach = x[lane] * direction.x + y[lane] * direction.y + z[lane] * direction.z;
+                let reach =
+                    corners.x[lane] * direction.x + corners.y[lane] * direction.y + corners.z[lane] * direction.z;
                 let farther = reach > best[lane];
                 best[lane] = if farther { reach } else { best[lane] };
                 found[lane] = if farther { group as u32 } else { found[lane] };
@@ -269,10 +265,10 @@ impl ConvexHull {
         (index, self.vertices[index])
     }
 
-    /// The vertices' x, y and z in arrays whose length is a multiple of eight. The padding repeats the first vertex.
+    /// What collision detection reads besides corners, faces and edges.
     #[inline(always)]
-    pub(crate) fn lanes(&self) -> [&[Real]; 3] {
-        [&self.lanes[0], &self.lanes[1], &self.lanes[2]]
+    pub(crate) fn features(&self) -> &HullFeatures {
+        &self.features
     }
 
     pub(crate) fn local_aabb(&self) -> Aabb {
@@ -310,9 +306,7 @@ impl Polyhedron<'_> {
         let height = |plane: &Plane| f64::from(plane.offset) - plane.normal.as_dvec3().dot(center);
         let inner_radius = lowest(planes.iter().map(height)) as Real;
         let edge_directions = self.edge_directions(&edges);
-        let padded = self.vertices.len().next_multiple_of(LANES);
-        let vertex = |i: usize| self.vertices.get(i).copied().unwrap_or(self.vertices[0]);
-        let lanes = [0, 1, 2].map(|axis| (0..padded).map(|i| vertex(i)[axis]).collect());
+        let features = HullFeatures::new(&self.vertices, &planes, &edges, unit_mass.center);
         let vertices = self.vertices;
         Some(Ok(ConvexHull {
             vertices,
@@ -320,7 +314,7 @@ impl Polyhedron<'_> {
             face_edges,
             edges,
             edge_directions,
-            lanes,
+            features,
             aabb,
             inner_radius,
             unit_mass,

@@ -411,3 +411,48 @@ fn hulls_as_thin_as_the_tolerance_are_valid_or_flat() {
     }
     assert!(closed > 2000 && flat > 500, "{closed} closed, {flat} flat");
 }
+
+/// Planes, corners, side planes, borders and rings tell the same as faces, vertices and half edges.
+#[test]
+fn features_tell_what_the_half_edges_tell() {
+    let mut random = Random(0x1357_9BDF_2468_ACE0);
+    for count in [4, 7, 12, 33, 80] {
+        let points: Vec<Vec3> = (0..count).map(|_| random.in_ball()).collect();
+        let hull = ConvexHull::new(&points).unwrap();
+        let features = hull.features();
+        for lane in 0..features.corners.len() * LANES {
+            let group = &features.corners[lane / LANES];
+            let corner = Vec3::new(group.x[lane % LANES], group.y[lane % LANES], group.z[lane % LANES]);
+            assert_eq!(corner, hull.vertices.get(lane).copied().unwrap_or(hull.vertices[0]));
+        }
+        let mut met = vec![0; hull.edges.len() / 2];
+        for (face, plane) in hull.planes.iter().enumerate() {
+            let (group, lane) = (&features.faces[face / LANES], face % LANES);
+            assert_eq!(Vec3::new(group.x[lane], group.y[lane], group.z[lane]), plane.normal);
+            assert_eq!(group.offset[lane], plane.offset);
+            let [start, end] = [face, face + 1].map(|f| usize::from(features.border_starts[f]));
+            assert_eq!(end - start, hull.face_vertices(face).count());
+            for border in &features.border[start..end] {
+                let [left, right] = [0, 1].map(|side| hull.edges[usize::from(border.edge) * 2 + side].face);
+                let cosine = hull.planes[usize::from(left)].normal.dot(hull.planes[usize::from(right)].normal);
+                assert!((2.0 * border.cosine_squared - 1.0 - cosine).abs() < 1e-6);
+                assert!(border.cosine_squared >= group.cosine_squared[lane]);
+                assert!([left, right].contains(&(face as u16)));
+                met[usize::from(border.edge)] += 1;
+            }
+        }
+        assert!(met.iter().all(|&times| times == 2));
+        for (index, edge) in hull.edges.iter().enumerate() {
+            let (side, normal) = (features.sides[index], hull.planes[usize::from(edge.face)].normal);
+            let ends = [index, index ^ 1].map(|e| hull.vertices[usize::from(hull.edges[e].origin)]);
+            assert!(ends.iter().all(|&end| side.distance(end).abs() < 1e-6) && side.normal.dot(normal).abs() < 1e-6);
+            assert!((side.normal.length() - 1.0).abs() < 1e-6);
+            assert!(hull.face_vertices(usize::from(edge.face)).all(|v| side.distance(hull.vertices[v]) < 1e-6));
+            let corner = usize::from(edge.origin);
+            let [start, end] = [corner, corner + 1].map(|c| usize::from(features.ring_starts[c]));
+            assert!(features.ring_faces[start..end].contains(&edge.face));
+        }
+        let furthest = hull.vertices.iter().map(|v| (*v - hull.centroid()).length()).fold(0.0, Real::max);
+        assert!((features.outer_radius - furthest).abs() < 1e-6);
+    }
+}
