@@ -5,7 +5,7 @@
 use super::{Engine, State, beyond_peers, rolling_resistance};
 use crate::scene::{Body, Scene};
 use arbiter3d::math::{Quat, Real, Rotation, Vec3};
-use arbiter3d::{BodyKind, ConvexHull, LockedAxes, Shape, ShapeDefinition, TriangleMesh, WorldSettings};
+use arbiter3d::{BodyKind, CombineRule, ConvexHull, LockedAxes, Shape, ShapeDefinition, TriangleMesh, WorldSettings};
 use boxddd_sys::ffi;
 use std::collections::HashMap;
 use std::ptr::null_mut;
@@ -26,6 +26,13 @@ pub struct Box3d {
 pub fn unsupported(body: &Body) -> Option<String> {
     let mesh = |shape: &ShapeDefinition| matches!(shape.shape, Shape::Mesh(_));
     let offset = |shape: &ShapeDefinition| shape.position != Vec3::ZERO || shape.rotation != Quat::IDENTITY;
+    let mixes_otherwise = |shape: &ShapeDefinition| {
+        let material = &shape.material;
+        [material.friction_combine, material.restitution_combine] != [CombineRule::Maximum; 2]
+    };
+    if body.shapes.iter().any(mixes_otherwise) {
+        return Some("friction or restitution that is not the larger of two".into());
+    }
     if body.definition.kind != BodyKind::Static && body.shapes.iter().any(mesh) {
         return Some("a moving mesh".into());
     }
@@ -47,6 +54,18 @@ fn quat(q: Quat) -> ffi::b3Quat {
     ffi::b3Quat { v: vec(Vec3::new(q.x, q.y, q.z)), s: q.w }
 }
 
+/// Our scenes take the larger friction of two, Box3D the root of the product. They agree where all frictions are the same;
+/// only where they are not is its mixing replaced.
+fn frictions_differ(scene: &Scene) -> bool {
+    let mut frictions = scene.all_bodies().flat_map(|body| &body.shapes).map(|shape| shape.material.friction);
+    let first = frictions.next();
+    frictions.any(|friction| Some(friction) != first)
+}
+
+unsafe extern "C" fn larger_friction(a: f32, _: u64, b: f32, _: u64) -> f32 {
+    if a > b { a } else { b }
+}
+
 impl Box3d {
     /// Builds the scene.
     pub fn new(scene: &Scene, threads: usize) -> Result<Self, String> {
@@ -59,6 +78,9 @@ impl Box3d {
             definition.enableSleep = settings.allow_sleep;
             definition.enableContinuous = settings.continuous;
             definition.workerCount = threads as u32;
+            if frictions_differ(scene) {
+                definition.frictionCallback = Some(larger_friction);
+            }
             ffi::b3CreateWorld(&definition)
         };
         // Our default threshold is also theirs; a scene's own is handed over.

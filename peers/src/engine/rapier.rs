@@ -28,6 +28,9 @@ pub fn unsupported(body: &Body) -> Option<String> {
     beyond_peers(body)
 }
 
+/// Steps within which what starts asleep must have fallen asleep.
+const SETTLE: usize = 240;
+
 fn vec(v: Vec3) -> Vector {
     Vector::new(v.x, v.y, v.z)
 }
@@ -61,13 +64,68 @@ impl Rapier {
         let sleep_speed = Some(scene.settings.sleep_speed).filter(|&speed| speed != default);
         let mut engine = Self {
             world,
-            bodies: Vec::with_capacity(scene.bodies.len()),
+            bodies: Vec::new(),
             shapes: HashMap::new(),
             allow_sleep: scene.settings.allow_sleep,
             sleep_speed,
         };
-        scene.bodies.iter().try_for_each(|body| engine.spawn(body))?;
+        engine.fill(scene)?;
         Ok(engine)
+    }
+
+    /// Adds the bodies of the scene. Rapier wakes bodies when their first contacts are found, also those inserted asleep; so
+    /// what starts asleep is put on the ground first and stepped until it sleeps, before anything else is there.
+    fn fill(&mut self, scene: &Scene) -> Result<(), String> {
+        let asleep = |body: &Body| !body.definition.awake && body.definition.kind == BodyKind::Dynamic;
+        let any_asleep = scene.bodies.iter().any(asleep);
+        let early = |body: &Body| !any_asleep || body.definition.kind == BodyKind::Static || asleep(body);
+        self.bodies = vec![RigidBodyHandle::invalid(); scene.bodies.len()];
+        for (index, body) in scene.bodies.iter().enumerate().filter(|(_, body)| early(body)) {
+            self.bodies[index] = self.insert(body)?;
+        }
+        let mut steps = 0;
+        while any_asleep && (steps == 0 || self.world.islands.num_active_bodies() > 0) {
+            if steps == SETTLE {
+                return Err(format!("bodies that start asleep are not so after {SETTLE} steps"));
+            }
+            self.step(scene.dt)?;
+            steps += 1;
+        }
+        for (index, body) in scene.bodies.iter().enumerate().filter(|(_, body)| !early(body)) {
+            self.bodies[index] = self.insert(body)?;
+        }
+        Ok(())
+    }
+
+    fn insert(&mut self, body: &Body) -> Result<RigidBodyHandle, String> {
+        let handle = self.world.insert_body(self.builder(body));
+        if let (Some(speed), true) = (self.sleep_speed, body.definition.can_sleep && self.allow_sleep) {
+            self.world.bodies[handle].activation_mut().normalized_linear_threshold = speed;
+        }
+        for shape in &body.shapes {
+            let collider = self.collider(shape)?;
+            self.world.insert_collider(collider, Some(handle));
+        }
+        Ok(handle)
+    }
+
+    fn builder(&self, body: &Body) -> RigidBodyBuilder {
+        let from = &body.definition;
+        let builder = match from.kind {
+            BodyKind::Static => RigidBodyBuilder::fixed(),
+            BodyKind::Kinematic => RigidBodyBuilder::kinematic_velocity_based(),
+            BodyKind::Dynamic => RigidBodyBuilder::dynamic(),
+        };
+        builder
+            .pose(pose(from.position, from.rotation))
+            .linvel(vec(from.linear_velocity))
+            .angvel(vec(from.angular_velocity))
+            .linear_damping(from.linear_damping)
+            .angular_damping(from.angular_damping)
+            .gravity_scale(from.gravity_scale)
+            .locked_axes(LockedAxes::from_bits_truncate(from.locked_axes.bits()))
+            .can_sleep(from.can_sleep && self.allow_sleep)
+            .sleeping(!from.awake)
     }
 
     fn geometry(&mut self, shape: &Shape) -> Result<SharedShape, String> {
@@ -124,30 +182,7 @@ impl Engine for Rapier {
     }
 
     fn spawn(&mut self, body: &Body) -> Result<(), String> {
-        let from = &body.definition;
-        let builder = match from.kind {
-            BodyKind::Static => RigidBodyBuilder::fixed(),
-            BodyKind::Kinematic => RigidBodyBuilder::kinematic_velocity_based(),
-            BodyKind::Dynamic => RigidBodyBuilder::dynamic(),
-        };
-        let builder = builder
-            .pose(pose(from.position, from.rotation))
-            .linvel(vec(from.linear_velocity))
-            .angvel(vec(from.angular_velocity))
-            .linear_damping(from.linear_damping)
-            .angular_damping(from.angular_damping)
-            .gravity_scale(from.gravity_scale)
-            .locked_axes(LockedAxes::from_bits_truncate(from.locked_axes.bits()))
-            .can_sleep(from.can_sleep && self.allow_sleep)
-            .sleeping(!from.awake);
-        let handle = self.world.insert_body(builder);
-        if let (Some(speed), true) = (self.sleep_speed, from.can_sleep && self.allow_sleep) {
-            self.world.bodies[handle].activation_mut().normalized_linear_threshold = speed;
-        }
-        for shape in &body.shapes {
-            let collider = self.collider(shape)?;
-            self.world.insert_collider(collider, Some(handle));
-        }
+        let handle = self.insert(body)?;
         self.bodies.push(handle);
         Ok(())
     }

@@ -53,9 +53,9 @@ fn line(row: &Row, ratio: String) -> Vec<String> {
         row.scene.clone(),
         row.engine.name().into(),
         row.threads.to_string(),
-        format!("{:.3}", row.median()),
-        format!("{:.3}", row.fastest()),
-        format!("{:.3}", row.worst_tenth),
+        milliseconds(row.median()),
+        milliseconds(row.fastest()),
+        milliseconds(row.worst_tenth),
         ratio,
         count(row.contacts),
         quality.points.to_string(),
@@ -66,6 +66,11 @@ fn line(row: &Row, ratio: String) -> Vec<String> {
         format!("{:.3e}", quality.kinetic_energy),
         megabytes,
     ]
+}
+
+/// Microseconds, and where the time is less than ten of them, nanoseconds.
+fn milliseconds(time: f64) -> String {
+    if time < 0.01 { format!("{time:.6}") } else { format!("{time:.3}") }
 }
 
 /// Columns padded to their widest cell: names to the left, numbers to the right; reasons of failure at the end.
