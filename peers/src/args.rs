@@ -21,9 +21,12 @@ pub struct Args {
     /// Numbers of threads
     #[arg(long, value_delimiter = ',', default_value = "1,2", value_name = "NUMBERS")]
     pub threads: Vec<usize>,
-    /// Runs of each, of which the median and the fastest are reported
-    #[arg(long, default_value_t = 3, value_name = "NUMBER")]
-    pub reps: usize,
+    /// Runs of each, of which the median and the fastest are reported; 3 unless given, 1 with --quick
+    #[arg(long, value_name = "NUMBER")]
+    pub reps: Option<usize>,
+    /// Size of every scene, instead of its own
+    #[arg(long, value_name = "NUMBER")]
+    pub size: Option<usize>,
     /// Steps of every scene, instead of its own
     #[arg(long, value_name = "NUMBER")]
     pub steps: Option<usize>,
@@ -66,6 +69,9 @@ pub enum Wrong {
     /// A number that makes no sense.
     #[error("{option} is {value}: it must be {wanted}")]
     Number { option: &'static str, value: String, wanted: &'static str },
+    /// A scene does not come in this size.
+    #[error("--size is {wanted}: {name} takes from 1 to {limit} {meaning}")]
+    Size { name: &'static str, wanted: usize, limit: usize, meaning: &'static str },
     /// A file cannot be written.
     #[error("cannot write {path}: {reason}")]
     File { path: String, reason: String },
@@ -75,7 +81,7 @@ impl Args {
     /// Checks everything that can be checked before the first run, output files included.
     pub fn plan(&self) -> Result<Plan, Wrong> {
         let number = |option, value: String, wanted| Err(Wrong::Number { option, value, wanted });
-        if self.reps == 0 {
+        if self.reps == Some(0) {
             return number("--reps", "0".into(), "at least 1");
         }
         if self.steps.is_some_and(|steps| steps < 2) {
@@ -98,14 +104,31 @@ impl Args {
         Ok(plan)
     }
 
+    /// Runs of each.
+    pub fn reps(&self) -> usize {
+        self.reps.unwrap_or(if self.quick { 1 } else { 3 })
+    }
+
     fn entries(&self) -> Result<Vec<Entry>, Wrong> {
-        let all = entries(self.quick);
+        let mut all = entries(self.quick);
+        if self.size.is_some() {
+            all.iter_mut().for_each(|entry| entry.size = self.size);
+        }
         let known = || all.iter().map(|entry| entry.name).collect::<Vec<_>>().join(", ");
         if let Some(name) = self.scenes.iter().find(|name| all.iter().all(|entry| entry.name != **name)) {
             return Err(Wrong::Scene { name: name.clone(), known: known() });
         }
         let wanted = |entry: &Entry| self.scenes.is_empty() || self.scenes.iter().any(|name| name == entry.name);
-        Ok(all.into_iter().filter(wanted).collect())
+        let entries: Vec<Entry> = all.into_iter().filter(wanted).collect();
+        for entry in &entries {
+            let size = arbiter3d_scenes::find(entry.name).map(|scene| scene.size);
+            if let (Some(wanted), Some(size)) = (self.size, size)
+                && !(1..=size.limit).contains(&wanted)
+            {
+                return Err(Wrong::Size { name: entry.name, wanted, limit: size.limit, meaning: size.meaning });
+            }
+        }
+        Ok(entries)
     }
 
     fn engines(&self) -> Result<Vec<Kind>, Wrong> {
@@ -159,6 +182,7 @@ mod tests {
             ("--scenes large_pyramid,nowhere", "nowhere"),
             ("--engines havok", "havok"),
             ("--reps 0", "--reps"),
+            ("--scenes large_pyramid --size 5000", "1 to 1000 rows"),
             ("--steps 1", "--steps"),
             ("--threads 0", "--threads"),
             ("--max-seconds -1", "--max-seconds"),

@@ -37,7 +37,7 @@ fn main() -> ExitCode {
 
 fn compare(args: &Args) -> Result<(), Wrong> {
     let plan = args.plan()?;
-    let runs = plan.entries.len() * plan.engines.len() * plan.threads.len() * args.reps;
+    let runs = plan.entries.len() * plan.engines.len() * plan.threads.len() * args.reps();
     let bar = ProgressBar::new(runs as u64);
     let style = ProgressStyle::with_template("{elapsed_precise} {bar:30} {pos}/{len} {msg}");
     bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
@@ -47,6 +47,9 @@ fn compare(args: &Args) -> Result<(), Wrong> {
     }
     bar.finish_and_clear();
     print!("{}", report::table::table(&rows));
+    if let Some(path) = &args.svg {
+        write(path, Some(&report::svg::draw(&rows)))?;
+    }
     if let Some(path) = &args.json {
         write(path, Some(&format!("{:#}\n", report::json::value(&rows))))?;
     }
@@ -67,13 +70,13 @@ fn time_scene(entry: &catalog::Entry, args: &Args, plan: &Plan, bar: &ProgressBa
         let reason = engine::unsupported(kind, &scene);
         if let Some(reason) = &reason {
             bar.println(format!("{}: left out for {}: {reason}", entry.name, kind.name()));
-            bar.inc((plan.threads.len() * args.reps) as u64);
+            bar.inc((plan.threads.len() * args.reps()) as u64);
         }
         reason.is_none()
     });
     let pairs = plan.threads.iter().flat_map(|&threads| engines.clone().map(move |&kind| (kind, threads)));
     let mut rows: Vec<Row> = pairs.map(|(kind, threads)| Row::new(entry.name, kind, threads, &scene)).collect();
-    for repetition in 0..args.reps {
+    for repetition in 0..args.reps() {
         for row in &mut rows {
             // What was stopped by the clock once would be so again.
             if !row.timed_out {
@@ -84,7 +87,7 @@ fn time_scene(entry: &catalog::Entry, args: &Args, plan: &Plan, bar: &ProgressBa
                     }
                 };
                 let run = run::run(row.engine, &scene, row.threads, args.max_seconds, &note);
-                row.add(run, entry.outcome, &scene, repetition + 1 == args.reps);
+                row.add(run, entry.outcome, &scene, repetition + 1 == args.reps());
             }
             bar.inc(1);
         }

@@ -40,7 +40,8 @@ impl Run {
     }
 }
 
-fn mean(values: &[f64]) -> f64 {
+/// Mean of some numbers; 0 of none.
+pub fn mean(values: &[f64]) -> f64 {
     if values.is_empty() { 0.0 } else { values.iter().sum::<f64>() / values.len() as f64 }
 }
 

@@ -27,6 +27,7 @@ fn row_value(row: &Row, ratio: Option<f64>) -> Value {
         "threads": row.threads,
         "ms_median": row.median(),
         "ms_min": row.fastest(),
+        "ms_floor": row.floor(),
         "ms_worst_tenth": row.worst_tenth,
         "ms_repetitions": row.means,
         "contacts": row.contacts,

@@ -7,7 +7,7 @@ pub mod table;
 use crate::catalog::Outcome;
 use crate::engine::Kind;
 use crate::ruler::{Quality, measure};
-use crate::run::Run;
+use crate::run::{Run, mean};
 use crate::scene::Scene;
 use crate::verdict::judge;
 use std::collections::BTreeMap;
@@ -27,6 +27,8 @@ pub struct Row {
     pub steps: usize,
     /// Mean step of each repetition, milliseconds.
     pub means: Vec<f64>,
+    /// Fastest time of each step over the repetitions, milliseconds.
+    pub best_steps: Vec<f64>,
     /// Mean of the slowest tenth of the steps, milliseconds, in the repetition where it is least.
     pub worst_tenth: f64,
     /// The engine's own count of contacts at the end.
@@ -51,6 +53,7 @@ impl Row {
             bodies: scene.bodies.len(),
             steps: scene.steps,
             means: Vec::new(),
+            best_steps: Vec::new(),
             worst_tenth: 0.0,
             contacts: None,
             quality: Quality::default(),
@@ -65,7 +68,13 @@ impl Row {
         if !run.steps.is_empty() {
             self.means.push(run.mean());
             let worst = run.worst_tenth();
-            self.worst_tenth = if self.means.len() == 1 { worst } else { self.worst_tenth.min(worst) };
+            if self.means.len() == 1 {
+                (self.worst_tenth, self.best_steps) = (worst, run.steps.clone());
+            } else {
+                self.worst_tenth = self.worst_tenth.min(worst);
+                self.best_steps.truncate(run.steps.len());
+                self.best_steps.iter_mut().zip(&run.steps).for_each(|(best, step)| *best = best.min(*step));
+            }
         }
         if !(is_last || run.stopped.is_some()) {
             return;
@@ -94,6 +103,11 @@ impl Row {
     /// The fastest repetition, milliseconds a step.
     pub fn fastest(&self) -> f64 {
         self.means.iter().copied().reduce(f64::min).unwrap_or(0.0)
+    }
+
+    /// Mean over the steps of the fastest time that each has taken: what remains when other programs disturb at times.
+    pub fn floor(&self) -> f64 {
+        mean(&self.best_steps)
     }
 
     /// Whether the time may be compared.
@@ -154,6 +168,7 @@ pub mod samples {
             bodies: 10,
             steps: 100,
             means: means.to_vec(),
+            best_steps: vec![0.5, 1.5],
             worst_tenth: 2.0,
             contacts: Some(40),
             quality: Quality::default(),
@@ -205,9 +220,23 @@ mod tests {
         assert!(super::worst(&[]).is_none() && geometric_means(&[]).is_empty());
     }
 
+    /// A step that was disturbed in one repetition counts as in the other.
+    #[test]
+    fn the_floor_takes_each_step_at_its_best() {
+        let options = arbiter3d_scenes::SceneOptions { size: Some(2), ..Default::default() };
+        let built = arbiter3d_scenes::find("large_pyramid").unwrap().build(&options).unwrap();
+        let scene = Scene::read(built, 4).unwrap();
+        let mut row = Row::new("large_pyramid", Kind::Box3d, 1, &scene);
+        for steps in [[1.0, 9.0, 2.0], [5.0, 3.0, 1.0]] {
+            row.add(Run { steps: steps.to_vec(), ..Run::default() }, Outcome::Moves, &scene, false);
+        }
+        assert_eq!(row.best_steps, [1.0, 3.0, 1.0]);
+        assert_eq!((row.fastest(), row.median()), (3.0, 3.5));
+    }
+
     #[test]
     fn the_median_of_two_is_their_mean() {
         let row = samples::row("a", Kind::Box3d, 1, &[3.0, 1.0]);
-        assert_eq!((row.median(), row.fastest()), (2.0, 1.0));
+        assert_eq!((row.median(), row.fastest(), row.floor()), (2.0, 1.0, 1.0));
     }
 }

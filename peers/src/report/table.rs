@@ -1,12 +1,17 @@
 //! The results for people: one aligned line for each scene, engine and number of threads.
+//!
+//! `ms/step` is the median over the repetitions of the mean step, `min` the least of them, `floor` the mean over the steps of
+//! the fastest time of each, `worst10%` the mean of the slowest tenth. `ratio` is ours over the fastest peer, which has a 1.
+//! `contacts` is the engine's own count (of points, of pairs, as it counts); `points`, `height` (mean, metres), `depth`
+//! (deepest penetration), `awake`, `drift` (sideways, metres) and `energy` are measured alike for all.
 
 use super::{Row, geometric_means, ratios, worst};
 use crate::engine::Kind;
 use std::fmt::Write;
 
-const HEADINGS: [&str; 15] = [
-    "scene", "engine", "thr", "ms/step", "min", "worst10%", "ratio", "contacts", "points", "height", "depth mm",
-    "awake", "drift", "energy J", "MB",
+const HEADINGS: [&str; 16] = [
+    "scene", "engine", "thr", "ms/step", "min", "floor", "worst10%", "ratio", "contacts", "points", "height",
+    "depth mm", "awake", "drift", "energy J", "MB",
 ];
 
 /// The whole table, with the geometric means and the worst scene below it.
@@ -55,6 +60,7 @@ fn line(row: &Row, ratio: String) -> Vec<String> {
         row.threads.to_string(),
         milliseconds(row.median()),
         milliseconds(row.fastest()),
+        milliseconds(row.floor()),
         milliseconds(row.worst_tenth),
         ratio,
         count(row.contacts),
