@@ -44,14 +44,20 @@ fn compare(args: &Args) -> Result<(), Wrong> {
     let mut rows = Vec::new();
     for entry in &plan.entries {
         rows.extend(time_scene(entry, args, &plan, &bar));
+        // After each scene, so that a long run that is broken off has not been for nothing.
+        save(args, &rows)?;
     }
     bar.finish_and_clear();
     print!("{}", report::table::table(&rows));
+    Ok(())
+}
+
+fn save(args: &Args, rows: &[Row]) -> Result<(), Wrong> {
     if let Some(path) = &args.svg {
-        write(path, Some(&report::svg::draw(&rows)))?;
+        write(path, Some(&report::svg::draw(rows)))?;
     }
     if let Some(path) = &args.json {
-        write(path, Some(&format!("{:#}\n", report::json::value(&rows))))?;
+        write(path, Some(&format!("{:#}\n", report::json::value(rows))))?;
     }
     Ok(())
 }
@@ -62,14 +68,14 @@ fn time_scene(entry: &catalog::Entry, args: &Args, plan: &Plan, bar: &ProgressBa
     let scene = match Scene::load(entry, args.steps) {
         Ok(scene) => scene,
         Err(error) => {
-            bar.println(format!("{}: {error}", entry.name));
+            bar.suspend(|| eprintln!("{}: {error}", entry.name));
             return Vec::new();
         }
     };
     let engines = plan.engines.iter().filter(|&&kind| {
         let reason = engine::unsupported(kind, &scene);
         if let Some(reason) = &reason {
-            bar.println(format!("{}: left out for {}: {reason}", entry.name, kind.name()));
+            bar.suspend(|| eprintln!("{}: left out for {}: {reason}", entry.name, kind.name()));
             bar.inc((plan.threads.len() * args.reps()) as u64);
         }
         reason.is_none()

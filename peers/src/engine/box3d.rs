@@ -8,6 +8,7 @@ use arbiter3d::math::{Quat, Real, Rotation, Vec3};
 use arbiter3d::{BodyKind, CombineRule, ConvexHull, LockedAxes, Shape, ShapeDefinition, TriangleMesh, WorldSettings};
 use boxddd_sys::ffi;
 use std::collections::HashMap;
+use std::ffi::{CStr, c_char};
 use std::ptr::null_mut;
 use std::sync::Arc;
 
@@ -62,6 +63,12 @@ fn frictions_differ(scene: &Scene) -> bool {
     frictions.any(|friction| Some(friction) != first)
 }
 
+/// Passes a warning on to where it does not get into the results.
+unsafe extern "C" fn warn(message: *const c_char) {
+    // SAFETY: Box3D hands over a string that ends in zero and lives during the call.
+    eprintln!("Box3D: {}", unsafe { CStr::from_ptr(message) }.to_string_lossy());
+}
+
 unsafe extern "C" fn larger_friction(a: f32, _: u64, b: f32, _: u64) -> f32 {
     if a > b { a } else { b }
 }
@@ -71,8 +78,9 @@ impl Box3d {
     pub fn new(scene: &Scene, threads: usize) -> Result<Self, String> {
         let defaults = WorldSettings::default();
         let settings = &scene.settings;
-        // SAFETY: the definition is the library's default with plain fields changed.
+        // SAFETY: the definition is the library's default with plain fields and callbacks without state changed.
         let world = unsafe {
+            ffi::b3SetLogFcn(Some(warn));
             let mut definition = ffi::b3DefaultWorldDef();
             definition.gravity = vec(settings.gravity);
             definition.enableSleep = settings.allow_sleep;
