@@ -6,7 +6,7 @@
 
 use crate::math::{Pose, Real, Rotation, SymmetricMat3, Vec3};
 use crate::parallel::SharedSlice;
-use crate::simd::{Wide, WideVec3};
+use crate::simd::{LaneVec3, Lanes, Quad};
 
 /// Marks a body index in a row whose body is not to be written.
 pub(crate) const READ_ONLY: u32 = 1 << 31;
@@ -43,6 +43,23 @@ impl Default for BodyState {
     }
 }
 
+impl BodyState {
+    /// The record as groups of four numbers, the first three of which are its twelve.
+    #[inline(always)]
+    pub fn quads(&self) -> &[Quad; 4] {
+        const { assert!(size_of::<Self>() == size_of::<[Quad; 4]>()) };
+        // SAFETY: `repr(C)`, of equal size, and any bits are a float.
+        unsafe { &*std::ptr::from_ref(self).cast() }
+    }
+
+    /// The same, to change; the fourth group is to be left alone.
+    #[inline(always)]
+    pub fn quads_mut(&mut self) -> &mut [Quad; 4] {
+        // SAFETY: as above, and any bits are an integer.
+        unsafe { &mut *std::ptr::from_mut(self).cast() }
+    }
+}
+
 /// Where the mass is and how it resists: world axes, locks included.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
@@ -68,6 +85,14 @@ impl Default for BodyMass {
 }
 
 impl BodyMass {
+    /// The record as groups of four numbers.
+    #[inline(always)]
+    pub fn quads(&self) -> &[Quad; 4] {
+        const { assert!(size_of::<Self>() == size_of::<[Quad; 4]>()) };
+        // SAFETY: `repr(C)`, sixteen floats.
+        unsafe { &*std::ptr::from_ref(self).cast() }
+    }
+
     /// Pose of the frame at the centre of mass.
     #[inline(always)]
     pub fn pose(&self) -> Pose {
@@ -148,16 +173,16 @@ impl SolverBodies {
 
 /// Velocities of the bodies on one side of a wide row.
 #[derive(Clone, Copy)]
-pub(crate) struct WideVelocity<const L: usize> {
-    pub linear: WideVec3<L>,
-    pub angular: WideVec3<L>,
+pub(crate) struct WideVelocity<W> {
+    pub linear: LaneVec3<W>,
+    pub angular: LaneVec3<W>,
 }
 
 /// How far the bodies on one side of a wide row have come in this step.
 #[derive(Clone, Copy)]
-pub(crate) struct WideDisplacement<const L: usize> {
-    pub translation: WideVec3<L>,
-    pub turn: WideVec3<L>,
+pub(crate) struct WideDisplacement<W> {
+    pub translation: LaneVec3<W>,
+    pub turn: LaneVec3<W>,
 }
 
 /// Body states as the passes share them: the rows of one colour touch different bodies.
@@ -168,51 +193,43 @@ pub(crate) type SharedStates<'a> = SharedSlice<'a, BodyState>;
 /// # Safety
 /// No other thread may write the bodies: rows of one colour share no dynamic body, and others are not written.
 #[inline(always)]
-pub(crate) unsafe fn gather<const L: usize>(
+pub(crate) unsafe fn gather<W: Lanes<L>, const L: usize>(
     states: &SharedStates<'_>,
     bodies: &[u32; L],
-) -> (WideVelocity<L>, WideDisplacement<L>) {
-    let mut columns = [Wide::<L>::ZERO; 12];
+) -> (WideVelocity<W>, WideDisplacement<W>) {
+    let mut records = [&[[0.0; 4]; 4]; L];
     for lane in 0..L {
-        // SAFETY: promised by the caller; the reference ends with this iteration.
-        let s = unsafe { &*states.get_mut((bodies[lane] & !READ_ONLY) as usize) };
-        let values = [
-            s.linear_velocity.x,
-            s.linear_velocity.y,
-            s.linear_velocity.z,
-            s.angular_velocity.x,
-            s.angular_velocity.y,
-            s.angular_velocity.z,
-            s.translation.x,
-            s.translation.y,
-            s.translation.z,
-            s.turn.x,
-            s.turn.y,
-            s.turn.z,
-        ];
-        for k in 0..12 {
-            columns[k][lane] = values[k];
-        }
+        // SAFETY: promised by the caller; the references end with this function.
+        records[lane] = unsafe { states.get((bodies[lane] & !READ_ONLY) as usize) }.quads();
     }
-    let [vx, vy, vz, wx, wy, wz, px, py, pz, tx, ty, tz] = columns;
+    let [vx, vy, vz, wx] = W::load_quad(&records, 0);
+    let [wy, wz, px, py] = W::load_quad(&records, 1);
+    let [pz, tx, ty, tz] = W::load_quad(&records, 2);
     (
-        WideVelocity { linear: WideVec3 { x: vx, y: vy, z: vz }, angular: WideVec3 { x: wx, y: wy, z: wz } },
-        WideDisplacement { translation: WideVec3 { x: px, y: py, z: pz }, turn: WideVec3 { x: tx, y: ty, z: tz } },
+        WideVelocity { linear: LaneVec3 { x: vx, y: vy, z: vz }, angular: LaneVec3 { x: wx, y: wy, z: wz } },
+        WideDisplacement { translation: LaneVec3 { x: px, y: py, z: pz }, turn: LaneVec3 { x: tx, y: ty, z: tz } },
     )
 }
 
-/// Stores the velocities of one side; read-only bodies are left alone.
+/// Stores the velocities of one side; read-only bodies are left alone. `displacement` is what [`gather`] gave with them:
+/// half of a group of four numbers that is written whole.
 ///
 /// # Safety
 /// No other thread may touch the bodies without [`READ_ONLY`].
 #[inline(always)]
-pub(crate) unsafe fn scatter<const L: usize>(states: &SharedStates<'_>, bodies: &[u32; L], velocity: &WideVelocity<L>) {
+pub(crate) unsafe fn scatter<W: Lanes<L>, const L: usize>(
+    states: &SharedStates<'_>,
+    bodies: &[u32; L],
+    (velocity, displacement): (&WideVelocity<W>, &WideDisplacement<W>),
+) {
+    let (v, w, p) = (&velocity.linear, &velocity.angular, &displacement.translation);
+    let first = W::store(&[v.x, v.y, v.z, w.x]);
+    let second = W::store(&[w.y, w.z, p.x, p.y]);
     for (lane, &body) in bodies.iter().enumerate() {
         if body & READ_ONLY == 0 {
             // SAFETY: promised by the caller; the reference ends with this iteration.
-            let state = unsafe { states.get_mut(body as usize) };
-            state.linear_velocity = velocity.linear.get(lane);
-            state.angular_velocity = velocity.angular.get(lane);
+            let quads = unsafe { states.get_unchecked_mut(body as usize) }.quads_mut();
+            (quads[0], quads[1]) = (first[lane], second[lane]);
         }
     }
 }

@@ -21,6 +21,9 @@ const OVERFLOW: u8 = 0;
 /// All groups of rows: the overflow, the dynamic colours, the static colours.
 const GROUPS: usize = 1 + DYNAMIC_COLORS + STATIC_COLORS;
 
+/// How many arbiters ahead of their use they are asked for.
+const PREFETCH_AHEAD: usize = 8;
+
 /// Contacts of one arbiter that share a normal: what becomes one lane of a row.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RowSource {
@@ -69,7 +72,11 @@ impl RowPlan {
         self.used.resize(bodies.states.len(), 0);
         self.fixed_rows.resize(bodies.states.len(), 0);
         self.unsorted.clear();
-        for &(_, index) in order {
+        for (i, &(_, index)) in order.iter().enumerate() {
+            if let Some(&(_, later)) = order.get(i + PREFETCH_AHEAD) {
+                crate::simd::prefetch(&arbiters[later as usize].body1);
+                crate::simd::prefetch(&arbiters[later as usize].data.usage_mask);
+            }
             let arbiter = &mut arbiters[index as usize];
             arbiter.data.mark_solved();
             if arbiter.data.usage_mask & 15 != 0 {

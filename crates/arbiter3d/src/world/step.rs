@@ -278,7 +278,7 @@ impl World {
         let target = StoreTarget {
             plan: &self.plan,
             arbiters: self.arbiters.slots_mut(),
-            bodies: &self.solver_bodies,
+            states: &mut self.solver_bodies.states,
             break_distance: self.scaled.contact_break_distance,
             may_break: &mut may_break,
         };
