@@ -216,6 +216,12 @@ pub static SCENES: &[Scene] = &[
         build: scenes::fields::sleeping_field,
     },
     Scene {
+        name: "sleeping_all",
+        description: "100,000 bodies asleep and none awake: what an idle world costs",
+        size: Size::new("sleeping bodies", 100_000, 2_000_000),
+        build: scenes::fields::sleeping_all,
+    },
+    Scene {
         name: "trees100",
         description: "50 falling trees of 22 hulls each on a wave of 60,000 triangles (Box3D)",
         size: Size::new("trees", 50, 1000),

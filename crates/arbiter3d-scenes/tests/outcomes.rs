@@ -144,3 +144,15 @@ fn the_field_sleeps_from_the_start() {
         assert_eq!((scene.world.awake_count(), scene.world.sleeping_count()), (100, 1000), "step {step}");
     }
 }
+
+/// A world in which all sleep stays as it is, to the bit.
+#[test]
+fn nothing_wakes_in_an_idle_world() {
+    let options = SceneOptions { size: Some(1000), ..SceneOptions::default() };
+    let mut scene = find("sleeping_all").unwrap().build(&options).unwrap();
+    scene.step(0).unwrap();
+    let hash = scene.world.hash();
+    run(&mut scene, 100);
+    assert_eq!((scene.world.awake_count(), scene.world.sleeping_count()), (0, 1000));
+    assert_eq!(scene.world.hash(), hash);
+}

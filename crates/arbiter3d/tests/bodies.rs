@@ -359,3 +359,24 @@ fn adding_and_removing_keeps_the_world_in_order() {
     }
     assert_eq!(world.body_count(), bodies.len());
 }
+
+/// What a definition says of mass and continuous collision can be read back.
+#[test]
+fn given_mass_and_continuity_are_told() {
+    let mut world = World::default();
+    let plain = world.add_body(&BodyDefinition::dynamic()).unwrap();
+    let sum = world.body(plain).unwrap().mass_properties();
+    let mut given = sum;
+    given.mass = 7.0;
+    let definition = BodyDefinition { mass: Some(given), continuous: false, ..BodyDefinition::dynamic() };
+    let heavy = world.add_body(&definition).unwrap();
+    let read = |world: &World, id: BodyId| {
+        let body = world.body(id).unwrap();
+        (body.given_mass().map(|mass| mass.mass), body.is_continuous())
+    };
+    assert_eq!(read(&world, plain), (None, true));
+    assert_eq!(read(&world, heavy), (Some(7.0), false));
+    world.body_mut(heavy).unwrap().set_mass(None).unwrap();
+    world.body_mut(heavy).unwrap().set_continuous(true);
+    assert_eq!(read(&world, heavy), (None, true));
+}

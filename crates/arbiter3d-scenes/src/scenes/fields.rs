@@ -40,8 +40,27 @@ fn drop_ball(world: &mut World, ball: &ShapeDefinition, index: usize, half_width
 /// Boxes that sleep from the start, 2 m apart, and beside them 100 balls that bounce for ever.
 pub(crate) fn sleeping_field(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
     const AWAKE_SIDE: usize = 10;
-    const SPACING: Real = 2.0;
     let mut scene = Builder::new(options, size)?;
+    let half_width = sleepers(&mut scene)?;
+    let ball = plain(Shape::sphere(0.5)?).restitution(1.0);
+    for index in 0..AWAKE_SIDE * AWAKE_SIDE {
+        let (i, j) = (index / AWAKE_SIDE, index % AWAKE_SIDE);
+        let position = Vec3::new(half_width + 10.0 + 4.0 * i as Real, 3.0 + 0.1 * j as Real, 4.0 * j as Real);
+        scene.add(&BodyDefinition { can_sleep: false, ..BodyDefinition::dynamic().at(position) }, &ball)?;
+    }
+    scene.finish(500)
+}
+
+/// Nothing but boxes that sleep from the start: what an idle world costs.
+pub(crate) fn sleeping_all(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
+    let mut scene = Builder::new(options, size)?;
+    sleepers(&mut scene)?;
+    scene.finish(500)
+}
+
+/// Adds ground, wider than the boxes by 60 m, and the sleeping boxes in a square; returns half the width of that.
+fn sleepers(scene: &mut Builder) -> Result<Real, Error> {
+    const SPACING: Real = 2.0;
     let count = scene.size;
     let side = (count as Real).sqrt() as usize + 1;
     let half_width = 0.5 * SPACING * side as Real;
@@ -52,11 +71,5 @@ pub(crate) fn sleeping_field(options: &SceneOptions, size: usize) -> Result<Buil
         let position = Vec3::new(SPACING * i as Real - half_width, 0.5, SPACING * j as Real - half_width);
         scene.add(&BodyDefinition { awake: false, ..BodyDefinition::dynamic().at(position) }, &cube)?;
     }
-    let ball = plain(Shape::sphere(0.5)?).restitution(1.0);
-    for index in 0..AWAKE_SIDE * AWAKE_SIDE {
-        let (i, j) = (index / AWAKE_SIDE, index % AWAKE_SIDE);
-        let position = Vec3::new(half_width + 10.0 + 4.0 * i as Real, 3.0 + 0.1 * j as Real, 4.0 * j as Real);
-        scene.add(&BodyDefinition { can_sleep: false, ..BodyDefinition::dynamic().at(position) }, &ball)?;
-    }
-    scene.finish(500)
+    Ok(half_width)
 }

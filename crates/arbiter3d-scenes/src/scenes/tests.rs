@@ -32,6 +32,7 @@ fn scenes_have_their_published_counts() {
         ("spheres10k", None, 10_000),
         ("trees100", None, 50),
         ("sleeping_field", None, 100_100),
+        ("sleeping_all", None, 100_000),
         ("large_world", Some(10), 0),
         ("ramps", None, 11),
         ("bounce", None, 11),

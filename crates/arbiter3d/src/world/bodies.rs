@@ -181,6 +181,12 @@ impl<'a> BodyRef<'a> {
         self.body().mass
     }
 
+    /// The mass that was given to the body; `None` if it is the sum over the shapes.
+    #[must_use]
+    pub fn given_mass(&self) -> Option<MassProperties> {
+        self.body().given_mass
+    }
+
     /// Centre of mass, world.
     #[must_use]
     pub fn center_of_mass(&self) -> Vec3 {
@@ -239,6 +245,12 @@ impl<'a> BodyRef<'a> {
     #[must_use]
     pub fn can_sleep(&self) -> bool {
         self.body().can_sleep
+    }
+
+    /// Whether continuous collision stops it at static shapes when it is fast.
+    #[must_use]
+    pub fn is_continuous(&self) -> bool {
+        self.body().continuous
     }
 
     /// Whether it takes part at all.
