@@ -317,6 +317,11 @@ impl ArbiterStore {
         &self.sorted
     }
 
+    /// Whether no arbiter is to be solved.
+    pub fn are_asleep(&self) -> bool {
+        !self.stale && self.fresh.is_empty() && self.sorted.is_empty()
+    }
+
     /// The solving order as of the last [`ArbiterStore::awake_by_key`].
     pub fn order(&self) -> &[(ArbiterKey, u32)] {
         &self.sorted

@@ -375,6 +375,11 @@ impl Events {
         self.sensor.begin_step();
     }
 
+    /// Whether no listener has anything to be told.
+    pub fn are_told(&self) -> bool {
+        self.unbegun.is_empty() && self.pending_ends.is_empty()
+    }
+
     pub fn end_step(&mut self) {
         self.begin.end_step();
         self.end.end_step();

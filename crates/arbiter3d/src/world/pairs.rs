@@ -123,6 +123,11 @@ impl PlaceSet {
         }
     }
 
+    /// Whether the list is up to date and empty.
+    pub fn is_empty(&self) -> bool {
+        !self.changed && self.list.is_empty()
+    }
+
     /// The places as of the last [`PlaceSet::refresh`], smallest first.
     pub fn list(&self) -> &[u32] {
         &self.list

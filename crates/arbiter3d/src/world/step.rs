@@ -4,7 +4,7 @@ use super::World;
 use super::bodies::world_inverse_inertia;
 use super::collide::shapes_overlap;
 use super::pairs::PairRules;
-use super::timings::{Phase, PhaseClock};
+use super::timings::{Phase, PhaseClock, Timings};
 use crate::arbiter::{EndReason, NONE};
 use crate::broad_phase::Boxes;
 use crate::error::{Error, in_range};
@@ -101,6 +101,12 @@ impl World {
             return Ok(report);
         }
         self.dt = dt;
+        if self.is_at_rest() {
+            self.events.begin_step();
+            self.events.end_step();
+            self.timings = Timings::default();
+            return Ok(report);
+        }
         let mut clock = PhaseClock::start();
         let work = self.awake.len() + self.active_pairs.list().len() + self.arbiters.order().len();
         self.pool.begin_step(work >= WORK_FOR_THREADS);
@@ -138,6 +144,20 @@ impl World {
             unreachable!("the world is inconsistent after a step, a bug in arbiter3d: {broken}");
         }
         Ok(report)
+    }
+
+    /// Whether a step would change nothing: all sleep, nothing has been moved, and nobody has anything to be told. The
+    /// clock alone would take longer than such a step.
+    fn is_at_rest(&self) -> bool {
+        self.awake.is_empty()
+            && !self.awake_changed
+            && self.active_pairs.is_empty()
+            && self.arbiters.are_asleep()
+            && !self.broad_phase.has_moved()
+            && self.scratch.moved.is_empty()
+            && self.providers.is_empty()
+            && self.removals.is_empty()
+            && self.events.are_told()
     }
 
     /// Lists the awake bodies and turns gravity and their forces into this step's accelerations.
