@@ -20,12 +20,12 @@ use common::*;
 
 /// The hashes of the scenes, in their order.
 const GOLDEN: [(&str, u64); 6] = [
-    ("pile", 0x21f8_4454_87a8_e62c),
-    ("hulls", 0x94d8_18a8_7bcf_1be2),
-    ("mesh rain", 0xb3a8_7230_c681_60ce),
-    ("bullets", 0xd6a7_057d_6b04_d919),
-    ("custom contacts", 0x2338_5f03_21e7_d705),
-    ("coming and going", 0x8e09_5a21_f8f3_2b4d),
+    ("pile", 0xe238_c513_e241_ee24),
+    ("hulls", 0xf3a1_4112_23d4_c5bf),
+    ("mesh rain", 0x1109_7117_b33f_c3a1),
+    ("bullets", 0xf5f4_3d43_c359_9e4d),
+    ("custom contacts", 0xf1f8_4790_c0e4_0cde),
+    ("coming and going", 0x75b2_3b3f_8283_adc3),
 ];
 
 /// A scene: how it begins, and what is done before each step.

@@ -21,6 +21,12 @@ impl<'a, T> SharedSlice<'a, T> {
         Self { start: slice.as_mut_ptr(), len: slice.len(), borrow: PhantomData }
     }
 
+    /// Where an element lies, to ask for it ahead of its use.
+    #[inline(always)]
+    pub fn place(&self, index: usize) -> *const T {
+        self.start.wrapping_add(index)
+    }
+
     /// One element.
     ///
     /// # Safety

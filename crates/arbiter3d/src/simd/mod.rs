@@ -6,8 +6,12 @@
 //!
 //! [`Instructions::run`] enters a kernel under the instructions of a level. Fused multiply-add is never enabled.
 
+mod pose;
+mod prefetch;
 mod wide;
 
+pub(crate) use pose::{WidePose, WideRotation};
+pub(crate) use prefetch::{prefetch, prefetch_line};
 pub(crate) use wide::{Wide, WideSymmetric, WideVec3};
 
 use std::fmt;

@@ -40,6 +40,23 @@ impl<const L: usize> Wide<L> {
         Self(from_fn(|i| if self.0[i] > 0.0 { yes.0[i] } else { no.0[i] }))
     }
 
+    /// In each lane `yes` where `self > other`, else `no`.
+    #[inline(always)]
+    pub fn if_greater(self, other: Self, yes: Self, no: Self) -> Self {
+        Self(from_fn(|i| if self.0[i] > other.0[i] { yes.0[i] } else { no.0[i] }))
+    }
+
+    /// In each lane `yes` where `self` is zero of either sign, else `no`.
+    #[inline(always)]
+    pub fn if_zero(self, yes: Self, no: Self) -> Self {
+        Self(from_fn(|i| if self.0[i] == 0.0 { yes.0[i] } else { no.0[i] }))
+    }
+
+    #[inline(always)]
+    pub fn abs(self) -> Self {
+        Self(from_fn(|i| self.0[i].abs()))
+    }
+
     /// `1 / self` where `self > 0`, else 0.
     #[inline(always)]
     pub fn inverse_or_zero(self) -> Self {
@@ -122,6 +139,12 @@ impl<const L: usize> WideVec3<L> {
     #[inline(always)]
     pub fn get(&self, lane: usize) -> Vec3 {
         Vec3::new(self.x[lane], self.y[lane], self.z[lane])
+    }
+
+    /// The three coordinates.
+    #[inline(always)]
+    pub fn columns(&self) -> [Wide<L>; 3] {
+        [self.x, self.y, self.z]
     }
 
     #[inline(always)]

@@ -82,7 +82,8 @@ pub struct World {
     pairs: Vec<pairs::Pair>,
     free_pairs: Vec<u32>,
     pair_set: PairSet,
-    active_pairs: Vec<u32>,
+    /// A bit for each pair with an awake body.
+    active_pairs: Vec<u64>,
     arbiters: ArbiterStore,
     sleeping: SleepingIslands,
     finder: IslandFinder,
@@ -372,8 +373,7 @@ impl World {
         self.scratch.note_moved(slot);
         // Pairs whose bodies all rest are not visited: they are tested here and now.
         let body = self.shapes[slot as usize].body;
-        let resting: Vec<u32> =
-            self.pairs_of_body(body).filter(|&pair| self.pairs[pair as usize].active_place == NONE).collect();
+        let resting: Vec<u32> = self.pairs_of_body(body).filter(|&pair| !self.pairs[pair as usize].active).collect();
         for pair in resting {
             let boxes = self.pairs[pair as usize].shapes.map(|slot| self.broad_phase.fat_aabb(slot).copied());
             if !matches!(boxes, [Some(a), Some(b)] if a.overlaps(&b)) {

@@ -2,7 +2,7 @@
 //!
 //! A pair remembers what the narrow phase may use again: its arbiter, the last separating feature, and the relative pose at
 //! the last full manifold. The pairs of a body hang on a doubly linked list through the records; those with an awake body
-//! stand in `active_pairs`.
+//! have a bit in `active_pairs`, so that the narrow phase visits them in the order in which they lie in memory.
 
 use super::World;
 use super::definition::BodyKind;
@@ -12,14 +12,18 @@ use crate::narrow_phase::PairCache;
 
 /// What the world keeps of a pair. Shape 1 has the smaller id.
 #[derive(Clone, Debug)]
+#[repr(C, align(64))] // what tells whether the manifold still holds fills the first cache line
 pub(crate) struct Pair {
-    pub shapes: [u32; 2],
+    /// Centre frame of body 2 seen from that of body 1 when the manifold was made.
+    pub manifold_pose: Pose,
+    /// How body 1 was turned when the manifold's normal and levers were put into world axes.
+    pub manifold_rotation: Rotation,
     pub bodies: [u32; 2],
     /// `NONE` while the shapes do not touch.
     pub arbiter: u32,
-    /// Place among the active pairs; `NONE` while both bodies rest.
-    pub active_place: u32,
     pub alive: bool,
+    /// Whether one of the bodies is awake.
+    pub active: bool,
     pub sensor: bool,
     /// Whether a surface of the two moves along itself: its direction turns with its body.
     pub conveyor: bool,
@@ -27,12 +31,9 @@ pub(crate) struct Pair {
     pub overlapping: bool,
     /// Whether `manifold_pose` holds: cleared by teleports and edits.
     pub has_manifold: bool,
-    /// Centre frame of body 2 seen from that of body 1 when the manifold was made.
-    pub manifold_pose: Pose,
-    /// How body 1 was turned when the manifold's normal and levers were put into world axes.
-    pub manifold_rotation: Rotation,
-    /// How far the pair may move (metres) before its manifold is made anew.
-    reuse_distance: Real,
+    pub shapes: [u32; 2],
+    /// Inner radius of the smaller shape, metres.
+    pub size: Real,
     /// How far a pair without contact may turn (sine of half the angle) until its shapes are looked at again.
     apart_rotation: Real,
     pub cache: PairCache,
@@ -43,39 +44,29 @@ pub(crate) struct Pair {
 /// How far a pair may move, in shares of the smaller shape's inner radius, before its manifold is made anew.
 const REUSE_TRANSLATION: Real = 0.02;
 /// How far a pair may turn (sine of half the angle) before its manifold is made anew: 1.4°.
-const REUSE_ROTATION: Real = 0.0125;
+pub(super) const REUSE_ROTATION: Real = 0.0125;
 
 impl Pair {
-    /// Whether the pair is so nearly where its manifold was made that the manifold may stay.
+    /// How far (metres, sine of half the angle) the bodies may move against each other before their shapes are looked at
+    /// again.
     ///
-    /// Relative to the size of the smaller shape, so that small bodies are treated as large ones are.
+    /// Where they touch, relative to the size of the smaller shape, so that small bodies are treated as large ones are.
+    /// Where they were more than a speculative distance apart, half of that is left for moving and turning, half for
+    /// closing: see [`Pair::closes_slowly`].
     #[inline(always)]
-    pub fn hardly_moved(&self, between: &Pose) -> bool {
-        let old = &self.manifold_pose;
-        let moved = between.position - old.position;
-        let turned = old.rotation.conjugate().mul(between.rotation).vector();
-        moved.length_squared() < self.reuse_distance * self.reuse_distance
-            && turned.length_squared() < REUSE_ROTATION * REUSE_ROTATION
+    pub fn reuse_limits(&self, speculative_distance: Real) -> (Real, Real) {
+        if self.arbiter == NONE {
+            (0.25 * speculative_distance, self.apart_rotation)
+        } else {
+            (REUSE_TRANSLATION * self.size, REUSE_ROTATION)
+        }
     }
 
-    /// Whether a pair whose shapes were more than a speculative distance apart, and now close by `closing` in a step, is still
-    /// too far apart to touch within it: half the distance is left for moving and turning, half for closing.
+    /// Whether shapes that were more than a speculative distance apart, and now close by `closing` in a step, are still too
+    /// far apart to touch within it.
     #[inline(always)]
-    pub fn still_apart(&self, between: &Pose, closing: Real, speculative_distance: Real) -> bool {
-        let old = &self.manifold_pose;
-        let moved = between.position - old.position;
-        let turned = old.rotation.conjugate().mul(between.rotation).vector();
-        let limit = 0.25 * speculative_distance;
-        closing < 2.0 * limit
-            && moved.length_squared() < limit * limit
-            && turned.length_squared() < self.apart_rotation * self.apart_rotation
-    }
-
-    /// Whether body 1 has turned so little that normal and levers may stay as they are.
-    #[inline(always)]
-    pub fn hardly_turned(&self, rotation1: Rotation) -> bool {
-        let turned = self.manifold_rotation.conjugate().mul(rotation1).vector();
-        turned.length_squared() < REUSE_ROTATION * REUSE_ROTATION
+    pub fn closes_slowly(closing: Real, speculative_distance: Real) -> bool {
+        closing < 2.0 * (0.25 * speculative_distance)
     }
 
     pub fn has_shape(&self, slot: u32) -> bool {
@@ -109,15 +100,15 @@ impl World {
             shapes,
             bodies,
             arbiter: NONE,
-            active_place: NONE,
             alive: true,
+            active: false,
             sensor: shapes.iter().any(|&slot| self.shapes[slot as usize].sensor),
             conveyor: shapes.iter().any(|&slot| self.shapes[slot as usize].material.tangent_velocity != Vec3::ZERO),
             overlapping: false,
             has_manifold: false,
             manifold_pose: Pose::IDENTITY,
             manifold_rotation: Rotation::IDENTITY,
-            reuse_distance: self.reuse_distance(shapes),
+            size: self.smaller_radius(shapes),
             apart_rotation: self.scaled.speculative_distance / (8.0 * max(reach(0), reach(1))),
             cache: PairCache::default(),
             next: [NONE; 2],
@@ -138,13 +129,11 @@ impl World {
         }
     }
 
-    fn reuse_distance(&self, shapes: [u32; 2]) -> Real {
-        let radii = shapes.map(|slot| self.shapes[slot as usize].geometry.inner_radius());
-        let smaller = match radii {
+    fn smaller_radius(&self, shapes: [u32; 2]) -> Real {
+        match shapes.map(|slot| self.shapes[slot as usize].geometry.inner_radius()) {
             [a, b] if a > 0.0 && b > 0.0 => min(a, b),
             [a, b] => max(a, b), // a mesh has no inside
-        };
-        REUSE_TRANSLATION * smaller
+        }
     }
 
     /// Ends a pair: its arbiter ends for `reason`, a sensor's overlap ends too.
@@ -178,19 +167,17 @@ impl World {
     }
 
     pub(crate) fn activate_pair(&mut self, index: u32) {
-        if self.pairs[index as usize].active_place == NONE {
-            self.pairs[index as usize].active_place = self.active_pairs.len() as u32;
-            self.active_pairs.push(index);
+        let (word, bit) = (index as usize / 64, index % 64);
+        if self.active_pairs.len() <= word {
+            self.active_pairs.resize(word + 1, 0);
         }
+        self.active_pairs[word] |= 1 << bit;
+        self.pairs[index as usize].active = true;
     }
 
     pub(crate) fn deactivate_pair(&mut self, index: u32) {
-        let place = std::mem::replace(&mut self.pairs[index as usize].active_place, NONE);
-        if place != NONE {
-            self.active_pairs.swap_remove(place as usize);
-            if let Some(&moved) = self.active_pairs.get(place as usize) {
-                self.pairs[moved as usize].active_place = place;
-            }
+        if std::mem::take(&mut self.pairs[index as usize].active) {
+            self.active_pairs[index as usize / 64] &= !(1 << (index % 64));
         }
     }
 

@@ -63,8 +63,9 @@ impl World {
     fn validate_pairs(&self) -> Result<(), String> {
         for (index, pair) in self.pairs.iter().enumerate().filter(|(_, pair)| pair.alive) {
             let awake = pair.bodies.iter().any(|&body| self.bodies[body as usize].awake);
-            if awake != (pair.active_place != NONE) {
-                return Err(format!("pair {index}: active {} with awake bodies {awake}", pair.active_place));
+            let listed = self.active_pairs.get(index / 64).is_some_and(|word| word >> (index % 64) & 1 == 1);
+            if awake != pair.active || awake != listed {
+                return Err(format!("pair {index}: active {}, listed {listed}, awake bodies {awake}", pair.active));
             }
             if self.pair_set.get(pair.shapes[0], pair.shapes[1]) != Some(index as u32) {
                 return Err(format!("pair {index} is missing from the set"));
