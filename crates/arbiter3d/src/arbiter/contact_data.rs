@@ -7,6 +7,7 @@
 use super::SolveMode;
 use crate::error::{self, Error};
 use crate::math::{Real, Vec3};
+use crate::simd::Quad;
 
 /// Slots of an arbiter.
 pub(crate) const SLOTS: usize = 4;
@@ -22,6 +23,7 @@ pub(crate) const SLOTS: usize = 4;
 /// # }
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(C)] // in groups of four numbers, as the solver's rows load and store them
 pub struct Contact {
     pub(crate) local_anchor1: Vec3,
     pub(crate) local_anchor2: Vec3,
@@ -30,15 +32,15 @@ pub struct Contact {
     pub(crate) arm2: Vec3,
     /// World normal from body 1 to body 2, as of when the manifold was made or the contact was registered.
     pub(crate) normal: Vec3,
-    /// The normal in the axes of body 1: what the engine's contacts turn with.
-    pub(crate) local_normal: Vec3,
-    pub(crate) separation: Real,
     /// Normal impulse of the last substep: what warm starting begins with.
     pub(crate) normal_impulse: Real,
-    /// Sum of the normal impulses of the last step's substeps.
-    pub(crate) total_impulse: Real,
     pub(crate) tangent_impulse: Vec3,
     pub(crate) twist_impulse: Real,
+    pub(crate) separation: Real,
+    /// Sum of the normal impulses of the last step's substeps.
+    pub(crate) total_impulse: Real,
+    /// The normal in the axes of body 1: what the engine's contacts turn with.
+    pub(crate) local_normal: Vec3,
     pub(crate) feature: u32,
     /// Velocity parts that this contact leaves alone.
     pub(crate) remove: SolveMode,
@@ -94,6 +96,21 @@ impl Contact {
     #[must_use]
     pub fn removed(&self) -> SolveMode {
         self.remove
+    }
+
+    /// The first twenty numbers in groups of four: anchors and levers, normal and impulses.
+    #[inline(always)]
+    pub(crate) fn quads(&self) -> &[Quad; 5] {
+        const { assert!(std::mem::offset_of!(Self, separation) == size_of::<[Quad; 5]>()) };
+        // SAFETY: `repr(C)`; the first twenty words are floats.
+        unsafe { &*std::ptr::from_ref(self).cast() }
+    }
+
+    /// The same, to change.
+    #[inline(always)]
+    pub(crate) fn quads_mut(&mut self) -> &mut [Quad; 5] {
+        // SAFETY: as above.
+        unsafe { &mut *std::ptr::from_mut(self).cast() }
     }
 
     /// Takes over the impulses of the contact that this one replaces, the tangential one turned into the new plane.

@@ -12,7 +12,7 @@
 //! witness points come from the weights of the simplex. Only the cores are compared: where they overlap, [`closest`]
 //! gives `None` and the caller turns to the separating axes.
 
-use crate::math::{Pose, Real, Vec3};
+use crate::math::{Aabb, Pose, Real, Vec3};
 use crate::shape::{Capsule, ConvexHull, Cuboid, Shape, Sphere};
 use glam::{DMat3, DVec3};
 
@@ -68,6 +68,29 @@ impl<'a> Support<'a> {
             }
             Self::Hull(s) => furthest(s.vertices(), direction),
             Self::Triangle(corners) => furthest(corners, direction),
+        }
+    }
+
+    /// The box around the shape placed by `pose`.
+    pub(crate) fn bounds(&self, pose: &Pose) -> Aabb {
+        match self {
+            Self::Sphere(s) => Aabb::from_center(pose.position, Vec3::splat(s.radius())),
+            Self::Capsule(s) => s.aabb(pose),
+            Self::Cuboid(s) => s.aabb(pose),
+            Self::Hull(s) => s.local_aabb().transform(pose),
+            Self::Triangle(corners) => Aabb::from_points(corners.map(|corner| pose.transform_point(corner))),
+        }
+    }
+
+    /// How far the shape reaches along a unit vector of its frame, metres.
+    pub(crate) fn extent(&self, direction: Vec3) -> Real {
+        let longest = |points: &[Vec3]| points.iter().fold(-Real::MAX, |m, p| crate::math::max(p.dot(direction), m));
+        match self {
+            Self::Sphere(s) => s.radius(),
+            Self::Capsule(s) => s.half_length() * direction.y.abs() + s.radius(),
+            Self::Cuboid(s) => s.half_extents().dot(crate::math::abs3(direction)),
+            Self::Hull(s) => longest(s.vertices()),
+            Self::Triangle(corners) => longest(corners),
         }
     }
 

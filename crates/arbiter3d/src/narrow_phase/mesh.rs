@@ -12,11 +12,12 @@
 
 use super::mesh_points::{Candidate, Candidates, NO_FACET};
 use super::polyhedron::{CuboidFeatures, Polyhedron};
-use super::triangle::{Frame, Reach, Solid, Triangle};
+use super::triangle::{Frame, Group, Reach, Solid};
+use super::triangle_lanes::Near;
 use super::triangle_solid::Solids;
 use super::{Manifold, ManifoldPoint, PairCache};
 use crate::math::{Aabb, Mat3, Pose, Real, Vec3};
-use crate::shape::{MeshSides, Shape, TriangleMesh};
+use crate::shape::{MeshSides, OCTET, Shape, TriangleMesh};
 
 /// How far behind a one-sided triangle a centre may be and still be pushed out in front, as a share of the scale of
 /// the contact: a body that is halfway through does not flicker.
@@ -71,23 +72,39 @@ impl Contact<'_> {
 
     /// Adds the points of all triangles near the shape. Returns whether one might overlap that gave no point.
     fn touch_all(&self, solid: &mut impl Solid, frame: &Frame, reach: &Reach, out: &mut Candidates) -> bool {
-        let center = frame.position + frame.rotation * solid.center();
-        let far = solid.outer_radius() + self.margin;
-        let bounds = solid.bounds().expand(self.margin);
+        let near = Near {
+            frame,
+            aabb: self.aabb,
+            bounds: solid.bounds().expand(self.margin),
+            center: frame.position + frame.rotation * solid.center(),
+            far: solid.outer_radius() + self.margin,
+            one_sided: self.mesh.sides() == MeshSides::One,
+            behind: BEHIND * reach.scale,
+        };
         let mut missing = false;
-        self.mesh.for_each_facet(&self.aabb, |index| {
-            let facet = self.mesh.facet(index);
-            let height = facet.normal.dot(center - facet.corners[0]);
-            let front = height >= 0.0 || (self.mesh.sides() == MeshSides::One && height >= -BEHIND * reach.scale);
-            if height.abs() > far || (!front && self.mesh.sides() == MeshSides::One) {
-                return;
+        let mut touching = Group::default();
+        let mut sift = |octet: usize, found: u8| {
+            let sides = near.sides(self.mesh.octet(octet));
+            for (k, &side) in sides.iter().enumerate() {
+                let wanted = (found >> k & 1 == 1) & (side != 0.0);
+                if wanted && touching.push((octet * OCTET + k) as u32, side) {
+                    missing |= solid.touch_group(self.mesh, frame, &mut touching, reach, out);
+                }
             }
-            let side = if front { 1.0 } else { -1.0 };
-            if let Some(triangle) = Triangle::new(self.mesh, frame, index, side, &bounds) {
-                missing |= solid.touch(&triangle, reach, out);
+        };
+        // The tree gives ascending numbers: those of one octet in a row.
+        let (mut octet, mut found) = (0, 0_u8);
+        self.mesh.for_each_candidate(&self.aabb, |index| {
+            if index / OCTET != octet && found != 0 {
+                sift(octet, std::mem::take(&mut found));
             }
+            octet = index / OCTET;
+            found |= 1 << (index % OCTET);
         });
-        missing
+        if found != 0 {
+            sift(octet, found);
+        }
+        missing | solid.touch_group(self.mesh, frame, &mut touching, reach, out)
     }
 }
 

@@ -25,6 +25,7 @@ mod polyhedron;
 mod sphere;
 mod time_of_impact;
 mod triangle;
+mod triangle_lanes;
 mod triangle_solid;
 
 pub(crate) use cuboid::{Axes as CuboidAxes, CuboidLanes, Near as NearCuboids, WideManifold};

@@ -7,6 +7,7 @@
 //! the face beside it, with the plane's own distance, and never the edge: seams inside a surface are not felt.
 
 use super::mesh_points::{Candidate, Candidates, NO_FACET};
+use super::triangle_lanes::LANES;
 use crate::math::{Aabb, Mat3, Real, Vec3, abs3, clamp, max, max3, min, min3};
 use crate::shape::{Capsule, Facet, Sphere, TriangleMesh};
 
@@ -59,39 +60,29 @@ pub(super) struct Triangle<'a> {
 }
 
 impl<'a> Triangle<'a> {
-    /// The triangle as seen from its front (`side` 1) or back (−1); `None` if it is outside the box, which is in the
-    /// frame of the shape.
+    /// The triangle as seen from its front (`side` 1) or back (−1).
     #[inline]
-    pub(super) fn new(
-        mesh: &'a TriangleMesh,
-        frame: &'a Frame,
-        index: usize,
-        side: Real,
-        bounds: &Aabb,
-    ) -> Option<Self> {
-        let facet = mesh.facet(index);
+    pub(super) fn new(mesh: &'a TriangleMesh, frame: &'a Frame, index: u32, side: Real) -> Self {
+        let facet = mesh.facet(index as usize);
         let corner = |i: usize| frame.inverse * (facet.corners[i] - frame.position);
         let corners = [corner(0), corner(1), corner(2)];
         let (low, high) =
             (min3(corners[0], min3(corners[1], corners[2])), max3(corners[0], max3(corners[1], corners[2])));
-        if !bounds.overlaps(&Aabb::new(low, high)) {
-            return None;
-        }
         let front = frame.inverse * facet.normal;
         let inward = |i: usize| frame.inverse * facet.inward[i];
         let extent = max3(abs3(low), abs3(high));
         let size = max(extent.x, max(extent.y, extent.z));
-        Some(Self {
+        Self {
             mesh,
             frame,
             facet,
-            index: index as u32,
+            index,
             corners,
             normal: front * side,
             offset: facet.normal.dot(facet.corners[0] - frame.position) * side,
             inward: [inward(0), inward(1), inward(2)],
             slack: 1e-3 * frame.scale + 2e-7 * size,
-        })
+        }
     }
 
     /// Height of a point above the plane.
@@ -222,6 +213,41 @@ pub(super) fn feature_id(triangle: u32, feature: u32) -> u32 {
     (mixed ^ mixed >> 15).wrapping_mul(0x2c1b_3c6d)
 }
 
+/// Up to eight triangles, to be looked at together.
+#[derive(Default)]
+pub(super) struct Group {
+    pub(super) indices: [u32; LANES],
+    /// From which side of each triangle the shape comes: 1 or −1.
+    pub(super) sides: [Real; LANES],
+    pub(super) count: usize,
+}
+
+impl Group {
+    /// Adds a triangle; true when there is no room for another.
+    #[inline(always)]
+    pub(super) fn push(&mut self, index: u32, side: Real) -> bool {
+        (self.indices[self.count], self.sides[self.count]) = (index, side);
+        self.count += 1;
+        self.count == LANES
+    }
+
+    /// Visits the triangles one by one, and is empty then. Returns whether any visit returned true.
+    #[inline(always)]
+    fn drain(&mut self, mesh: &TriangleMesh, frame: &Frame, mut visit: impl FnMut(&Triangle) -> bool) -> bool {
+        let mut any = false;
+        for k in 0..std::mem::take(&mut self.count) {
+            any |= visit(&Triangle::new(mesh, frame, self.indices[k], self.sides[k]));
+        }
+        any
+    }
+
+    /// The triangles; places left over hold triangles of any kind.
+    #[inline(always)]
+    pub(super) fn facets<'a>(&self, mesh: &'a TriangleMesh) -> [&'a Facet; LANES] {
+        std::array::from_fn(|k| mesh.facet(self.indices[k] as usize))
+    }
+}
+
 /// A convex shape that can be held against triangles one by one.
 pub(super) trait Solid {
     /// A point inside, in the shape's frame.
@@ -232,9 +258,16 @@ pub(super) trait Solid {
     fn outer_radius(&self) -> Real;
     /// The box around the shape in its frame.
     fn bounds(&self) -> Aabb;
-    /// Adds the points of one triangle. Returns whether the triangle might overlap the shape but gave no point, because it
-    /// is the neighbours' matter: if they give none either, it is looked at again.
-    fn touch(&mut self, triangle: &Triangle, reach: &Reach, out: &mut Candidates) -> bool;
+    /// Adds the points of the triangles of a group, which is empty after it. Returns whether one might overlap the shape
+    /// but gave no point, because it is the neighbours' matter: if they give none either, it is looked at again.
+    fn touch_group(
+        &mut self,
+        mesh: &TriangleMesh,
+        frame: &Frame,
+        group: &mut Group,
+        reach: &Reach,
+        out: &mut Candidates,
+    ) -> bool;
 }
 
 impl Solid for Sphere {
@@ -254,47 +287,58 @@ impl Solid for Sphere {
         self.local_aabb()
     }
 
-    /// The face if the centre is above it, else the nearest edge or corner if that is a summit.
-    fn touch(&mut self, triangle: &Triangle, reach: &Reach, out: &mut Candidates) -> bool {
-        let height = triangle.height(Vec3::ZERO);
-        if height - self.radius() > reach.margin {
-            return false;
-        }
-        let slack = SEAM_SINE * height.abs() + triangle.slack;
-        let inside = |i: usize| triangle.inward[i].dot(triangle.corners[i]) <= slack;
-        if inside(0) && inside(1) && inside(2) {
-            out.push(triangle.face_candidate(Vec3::ZERO, height, self.radius(), 0));
-            return false;
-        }
-        if triangle.is_plain() && !reach.second_look {
-            return height < self.radius();
-        }
-        let mut nearest = (Real::MAX, 0, 0.0, Vec3::ZERO);
-        for i in 0..3 {
-            let (a, b) = triangle.edge(i);
-            let edge = b - a;
-            let t = clamp(-a.dot(edge) / edge.length_squared(), 0.0, 1.0);
-            let point = a + edge * t;
-            if point.length_squared() < nearest.0 {
-                nearest = (point.length_squared(), i, t, point);
-            }
-        }
-        let (squared, i, t, point) = nearest;
-        let distance = squared.sqrt();
-        if distance - self.radius() > reach.margin || distance < 1e-6 * self.radius() {
-            return distance < self.radius();
-        }
-        let normal = point * (-1.0 / distance);
-        if rim_allows(triangle, i, t, normal) {
-            out.push(triangle.rim_candidate(point, normal, distance - self.radius(), i as u32));
-            return false;
-        }
-        // The neighbours have a nearer point. If rounding lost it between them, the face takes it.
-        if reach.second_look && distance < self.radius() {
-            out.push(triangle.face_candidate(point + triangle.normal * height, height, self.radius(), 0));
-        }
-        distance < self.radius()
+    fn touch_group(
+        &mut self,
+        mesh: &TriangleMesh,
+        frame: &Frame,
+        group: &mut Group,
+        reach: &Reach,
+        out: &mut Candidates,
+    ) -> bool {
+        group.drain(mesh, frame, |triangle| touch_sphere(self, triangle, reach, out))
     }
+}
+
+/// The face if the centre is above it, else the nearest edge or corner if that is a summit.
+fn touch_sphere(sphere: &Sphere, triangle: &Triangle, reach: &Reach, out: &mut Candidates) -> bool {
+    let height = triangle.height(Vec3::ZERO);
+    if height - sphere.radius() > reach.margin {
+        return false;
+    }
+    let slack = SEAM_SINE * height.abs() + triangle.slack;
+    let inside = |i: usize| triangle.inward[i].dot(triangle.corners[i]) <= slack;
+    if inside(0) && inside(1) && inside(2) {
+        out.push(triangle.face_candidate(Vec3::ZERO, height, sphere.radius(), 0));
+        return false;
+    }
+    if triangle.is_plain() && !reach.second_look {
+        return height < sphere.radius();
+    }
+    let mut nearest = (Real::MAX, 0, 0.0, Vec3::ZERO);
+    for i in 0..3 {
+        let (a, b) = triangle.edge(i);
+        let edge = b - a;
+        let t = clamp(-a.dot(edge) / edge.length_squared(), 0.0, 1.0);
+        let point = a + edge * t;
+        if point.length_squared() < nearest.0 {
+            nearest = (point.length_squared(), i, t, point);
+        }
+    }
+    let (squared, i, t, point) = nearest;
+    let distance = squared.sqrt();
+    if distance - sphere.radius() > reach.margin || distance < 1e-6 * sphere.radius() {
+        return distance < sphere.radius();
+    }
+    let normal = point * (-1.0 / distance);
+    if rim_allows(triangle, i, t, normal) {
+        out.push(triangle.rim_candidate(point, normal, distance - sphere.radius(), i as u32));
+        return false;
+    }
+    // The neighbours have a nearer point. If rounding lost it between them, the face takes it.
+    if reach.second_look && distance < sphere.radius() {
+        out.push(triangle.face_candidate(point + triangle.normal * height, height, sphere.radius(), 0));
+    }
+    distance < sphere.radius()
 }
 
 /// Whether the point at `t` of edge `i` may push along `normal`.
@@ -325,44 +369,55 @@ impl Solid for Capsule {
         self.local_aabb()
     }
 
-    /// The ends of the part of the segment above the face, and the nearest points of the edges that are summits there.
-    fn touch(&mut self, triangle: &Triangle, reach: &Reach, out: &mut Candidates) -> bool {
-        let end = Vec3::new(0.0, self.half_length(), 0.0);
-        let (low, high) = (triangle.height(-end), triangle.height(end));
-        let lowest = min(low, high);
-        if lowest - self.radius() > reach.margin {
-            return false;
-        }
-        let mut missing = lowest < self.radius();
-        if let Some((ends, cuts)) = Triangle::clip(&triangle.insides(-end), &triangle.insides(end)) {
-            let heights = ends.map(|t| low + (high - low) * t);
-            // A segment that runs under the triangle without crossing it counts only while the capsule still reaches up
-            // through the plane.
-            let crosses = max(heights[0], heights[1]) >= -self.radius();
-            let count = if ends[1] - ends[0] > 1e-6 { 2 } else { 1 };
-            for k in 0..count {
-                if crosses
-                    && heights[k] - self.radius() <= reach.margin
-                    && (reach.second_look || !triangle.is_seam(cuts[k]))
-                {
-                    let cut = 2 + (triangle.facet.id << 3 | cuts[k] << 1 | k as u32);
-                    let feature = if cuts[k] == 3 { k as u32 } else { cut };
-                    let point = end * (2.0 * ends[k] - 1.0);
-                    out.push(triangle.face_candidate(point, heights[k], self.radius(), feature));
-                    missing = false;
-                }
-            }
-        }
-        for i in 0..3 {
-            if triangle.facet.sharp_edges >> i & 1 == 1 || triangle.facet.sharp_corners >> i & 1 == 1 {
-                missing &= !self.touch_edge(triangle, i, reach, out);
-            }
-        }
-        if missing && reach.second_look {
-            self.touch_anyway(triangle, out);
-        }
-        missing
+    fn touch_group(
+        &mut self,
+        mesh: &TriangleMesh,
+        frame: &Frame,
+        group: &mut Group,
+        reach: &Reach,
+        out: &mut Candidates,
+    ) -> bool {
+        group.drain(mesh, frame, |triangle| touch_capsule(self, triangle, reach, out))
     }
+}
+
+/// The ends of the part of the segment above the face, and the nearest points of the edges that are summits there.
+fn touch_capsule(capsule: &Capsule, triangle: &Triangle, reach: &Reach, out: &mut Candidates) -> bool {
+    let end = Vec3::new(0.0, capsule.half_length(), 0.0);
+    let (low, high) = (triangle.height(-end), triangle.height(end));
+    let lowest = min(low, high);
+    if lowest - capsule.radius() > reach.margin {
+        return false;
+    }
+    let mut missing = lowest < capsule.radius();
+    if let Some((ends, cuts)) = Triangle::clip(&triangle.insides(-end), &triangle.insides(end)) {
+        let heights = ends.map(|t| low + (high - low) * t);
+        // A segment that runs under the triangle without crossing it counts only while the capsule still reaches up
+        // through the plane.
+        let crosses = max(heights[0], heights[1]) >= -capsule.radius();
+        let count = if ends[1] - ends[0] > 1e-6 { 2 } else { 1 };
+        for k in 0..count {
+            if crosses
+                && heights[k] - capsule.radius() <= reach.margin
+                && (reach.second_look || !triangle.is_seam(cuts[k]))
+            {
+                let cut = 2 + (triangle.facet.id << 3 | cuts[k] << 1 | k as u32);
+                let feature = if cuts[k] == 3 { k as u32 } else { cut };
+                let point = end * (2.0 * ends[k] - 1.0);
+                out.push(triangle.face_candidate(point, heights[k], capsule.radius(), feature));
+                missing = false;
+            }
+        }
+    }
+    for i in 0..3 {
+        if triangle.facet.sharp_edges >> i & 1 == 1 || triangle.facet.sharp_corners >> i & 1 == 1 {
+            missing &= !capsule.touch_edge(triangle, i, reach, out);
+        }
+    }
+    if missing && reach.second_look {
+        capsule.touch_anyway(triangle, out);
+    }
+    missing
 }
 
 impl Capsule {

@@ -14,8 +14,12 @@
 
 use super::mesh_points::{Candidate, Candidates};
 use super::polyhedron::Polyhedron;
-use super::triangle::{Reach, Solid, Triangle, feature_id, parallel_part};
+use super::triangle::{Frame, Group, Reach, Solid, Triangle, feature_id, parallel_part};
+#[cfg(test)]
+use super::triangle_lanes::BACKWARD;
+use super::triangle_lanes::LeastOverlap;
 use crate::math::{Aabb, Real, Vec3, clamp, max, min};
+use crate::shape::TriangleMesh;
 
 /// An edge, or the face, of a triangle lies level with its highest corner below this sine.
 const LEVEL_SINE: Real = 0.02;
@@ -32,9 +36,9 @@ const FLAT_SINE: Real = 0.05;
 /// the overlap by this share of the scale.
 const EXTRA_DEPTH: Real = 0.25;
 
-/// Axes that push through the triangle to its other side are no way out; those that lean back less tell at least that
-/// the contact is a neighbour's.
-const BACKWARD: Real = -0.7;
+/// The triangle's face wins unless another axis is better by more than rounding and rocking can make it: this share of
+/// the scale.
+const BIAS: Real = 0.02;
 
 /// A cuboid or a hull with the ball around it.
 pub(super) struct Solids<'a> {
@@ -89,39 +93,41 @@ impl Solid for Solids<'_> {
         self.bounds
     }
 
-    fn touch(&mut self, triangle: &Triangle, reach: &Reach, out: &mut Candidates) -> bool {
-        if self.underside.normal != triangle.normal {
-            self.underside = Underside::new(&self.features, triangle.normal);
-        }
-        let height = triangle.height(self.features.vertices[self.underside.corner]);
-        if height > reach.margin {
+    fn touch_group(
+        &mut self,
+        mesh: &TriangleMesh,
+        frame: &Frame,
+        group: &mut Group,
+        reach: &Reach,
+        out: &mut Candidates,
+    ) -> bool {
+        if group.count == 0 {
             return false;
         }
-        let pair = Pair { solid: &self.features, triangle, reach, underside: &self.underside, height };
-        let shallow = triangle.is_plain() && height >= -SHALLOW * self.features.inner_radius;
-        if (shallow || pair.stands_on_face(self.underside.corner)) && !reach.second_look {
-            return pair.touch_face(&FacePoints::ALL, out) == 0 && height < 0.0;
-        }
-        let Some((axis, separation)) = pair.least_overlap() else { return false };
-        let resolved = pair.resolve(axis);
-        let points = match resolved {
-            Some(Axis::Triangle) => pair.touch_face(&FacePoints::ALL, out),
-            Some(Axis::Face { face }) => pair.touch_solid_face(face, out),
-            Some(Axis::Edges { edge, solid_edge, normal }) => pair.touch_edges(edge, solid_edge, normal, out),
-            None if separation < 0.0 && pair.is_hemmed_in(axis, separation) => pair.touch_face(&FacePoints::ALL, out),
-            None => 0,
+        let search = LeastOverlap {
+            solid: &self.features,
+            frame,
+            facets: group.facets(mesh),
+            sides: group.sides,
+            margin: reach.margin,
+            bias: BIAS * reach.scale,
+            shallow: if reach.second_look { -Real::MAX } else { SHALLOW * self.features.inner_radius },
         };
-        if resolved != Some(Axis::Triangle) && !reach.second_look && pair.lies_flat() {
-            let least = separation - EXTRA_DEPTH * reach.scale;
-            pair.touch_face(&FacePoints { least, rims: points == 0 }, out);
+        let found = search.find();
+        let mut missing = false;
+        for k in 0..std::mem::take(&mut group.count) {
+            if found.near[k] > 0.0 {
+                let triangle = Triangle::new(mesh, frame, group.indices[k], group.sides[k]);
+                if self.underside.normal != triangle.normal {
+                    self.underside = Underside::new(&self.features, triangle.normal);
+                }
+                let height = found.height[k];
+                let pair =
+                    Pair { solid: &self.features, triangle: &triangle, reach, underside: &self.underside, height };
+                missing |= pair.touch(found.axis[k] as usize, found.separation[k], out);
+            }
         }
-        if points > 0 || separation >= 0.0 {
-            return false;
-        }
-        if reach.second_look && pair.touch_face(&FacePoints::ALL, out) == 0 {
-            pair.touch_overlap(out);
-        }
-        true
+        missing
     }
 }
 
@@ -181,11 +187,58 @@ impl Pair<'_> {
         (0..3).all(|i| triangle.inward[i].dot(corner - triangle.corners[i]) >= self.height.abs())
     }
 
-    /// The axis of least overlap and the separation along it; `None` if some axis shows a gap beyond the margin. The
-    /// triangle's face wins unless another axis is better by more than rounding and rocking can make it.
+    /// Adds the points, given the axis of least overlap (see [`Overlaps`](super::triangle_lanes::Overlaps)) and the
+    /// separation along it.
+    fn touch(&self, axis: usize, separation: Real, out: &mut Candidates) -> bool {
+        let shallow = self.triangle.is_plain() && self.height >= -SHALLOW * self.solid.inner_radius;
+        if (shallow || self.stands_on_face(self.underside.corner)) && !self.reach.second_look {
+            return self.touch_face(&FacePoints::ALL, out) == 0 && self.height < 0.0;
+        }
+        let axis = self.axis(axis);
+        let resolved = self.resolve(axis);
+        let points = match resolved {
+            Some(Axis::Triangle) => self.touch_face(&FacePoints::ALL, out),
+            Some(Axis::Face { face }) => self.touch_solid_face(face, out),
+            Some(Axis::Edges { edge, solid_edge, normal }) => self.touch_edges(edge, solid_edge, normal, out),
+            None if separation < 0.0 && self.is_hemmed_in(axis, separation) => self.touch_face(&FacePoints::ALL, out),
+            None => 0,
+        };
+        if resolved != Some(Axis::Triangle) && !self.reach.second_look && self.lies_flat() {
+            let least = separation - EXTRA_DEPTH * self.reach.scale;
+            self.touch_face(&FacePoints { least, rims: points == 0 }, out);
+        }
+        if points > 0 || separation >= 0.0 {
+            return false;
+        }
+        if self.reach.second_look && self.touch_face(&FacePoints::ALL, out) == 0 {
+            self.touch_overlap(out);
+        }
+        true
+    }
+
+    /// The axis of a number as in [`Overlaps`](super::triangle_lanes::Overlaps).
+    fn axis(&self, number: usize) -> Axis {
+        let (faces, edges) = (self.solid.planes.len(), self.solid.edges.len() / 2);
+        if number == 0 {
+            return Axis::Triangle;
+        }
+        if number <= faces {
+            return Axis::Face { face: number - 1 };
+        }
+        let (edge, solid_edge) = ((number - 1 - faces) / edges, 2 * ((number - 1 - faces) % edges));
+        let (start, end) = self.triangle.edge(edge);
+        match self.edge_normal(edge, end - start, solid_edge) {
+            Some(normal) => Axis::Edges { edge, solid_edge, normal },
+            None => Axis::Triangle,
+        }
+    }
+
+    /// The axis of least overlap and the separation along it, one triangle at a time; `None` if some axis shows a gap
+    /// beyond the margin.
+    #[cfg(test)]
     fn least_overlap(&self) -> Option<(Axis, Real)> {
         let mut best = (Axis::Triangle, self.height);
-        let bias = 0.02 * self.reach.scale;
+        let bias = BIAS * self.reach.scale;
         let mut offer = |axis: Axis, normal: Vec3, separation: Real| {
             if separation > best.1 + bias && normal.dot(self.triangle.normal) > BACKWARD {
                 best = (axis, separation);
@@ -498,3 +551,7 @@ impl Pair<'_> {
         });
     }
 }
+
+#[cfg(test)]
+#[path = "triangle_lanes_tests.rs"]
+mod tests;

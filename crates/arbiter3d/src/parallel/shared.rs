@@ -21,12 +21,6 @@ impl<'a, T> SharedSlice<'a, T> {
         Self { start: slice.as_mut_ptr(), len: slice.len(), borrow: PhantomData }
     }
 
-    /// Where an element lies, to ask for it ahead of its use.
-    #[inline(always)]
-    pub fn place(&self, index: usize) -> *const T {
-        self.start.wrapping_add(index)
-    }
-
     /// One element.
     ///
     /// # Safety
@@ -37,6 +31,38 @@ impl<'a, T> SharedSlice<'a, T> {
         assert!(index < self.len, "index {index} of a shared slice of {}", self.len);
         // SAFETY: in bounds; unaliased by the caller's promise.
         unsafe { &mut *self.start.add(index) }
+    }
+
+    /// One element to read, in bounds by construction.
+    ///
+    /// # Safety
+    /// `index` must be in bounds, and no thread may write the element while the reference lives.
+    #[inline(always)]
+    pub unsafe fn get(&self, index: usize) -> &T {
+        debug_assert!(index < self.len, "index {index} of a shared slice of {}", self.len);
+        // SAFETY: promised by the caller.
+        unsafe { &*self.start.add(index) }
+    }
+
+    /// One element to write, in bounds by construction.
+    ///
+    /// # Safety
+    /// As [`SharedSlice::get_mut`], and `index` must be in bounds.
+    #[inline(always)]
+    #[expect(clippy::mut_from_ref, reason = "disjointness is the caller's promise")]
+    pub unsafe fn get_unchecked_mut(&self, index: usize) -> &mut T {
+        debug_assert!(index < self.len, "index {index} of a shared slice of {}", self.len);
+        // SAFETY: promised by the caller.
+        unsafe { &mut *self.start.add(index) }
+    }
+
+    /// Asks for an element to be brought into the cache.
+    #[inline(always)]
+    pub fn prefetch(&self, index: usize) {
+        if index < self.len {
+            // SAFETY: in bounds; not read.
+            crate::simd::prefetch(unsafe { &*self.start.add(index).cast::<std::mem::MaybeUninit<T>>() });
+        }
     }
 
     /// A run of elements.

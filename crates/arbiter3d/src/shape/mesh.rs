@@ -12,6 +12,7 @@ use super::ShapeError;
 use super::mesh_edges::{Adjacency, Neighborhood};
 use super::mesh_tree::{MeshTree, Slabs};
 use crate::math::{Aabb, Real, Vec3};
+use crate::simd::{LaneVec3, Wide};
 
 pub use super::mesh_edges::MeshEdge;
 pub use super::mesh_tree::MeshNode;
@@ -59,6 +60,31 @@ pub(crate) struct Facet {
     pub(crate) flat_corners: u8,
 }
 
+/// Triangles in an [`Octet`].
+pub(crate) const OCTET: usize = 8;
+
+/// Corners and normals of eight consecutive triangles side by side: what tells whether one of them is near. Those past the
+/// end of the mesh are zero.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub(crate) struct Octet {
+    pub(crate) corners: [LaneVec3<Wide<OCTET>>; 3],
+    pub(crate) normal: LaneVec3<Wide<OCTET>>,
+}
+
+impl Octet {
+    fn new(facets: &[Facet]) -> Self {
+        let mut octet = Self { corners: [LaneVec3::ZERO; 3], normal: LaneVec3::ZERO };
+        for (lane, facet) in facets.iter().enumerate() {
+            for (corners, corner) in octet.corners.iter_mut().zip(facet.corners) {
+                corners.set::<OCTET>(lane, corner);
+            }
+            octet.normal.set::<OCTET>(lane, facet.normal);
+        }
+        octet
+    }
+}
+
 /// A triangle mesh for static and kinematic bodies.
 ///
 /// ```
@@ -76,6 +102,7 @@ pub struct TriangleMesh {
     sides: MeshSides,
     tree: MeshTree,
     facets: Vec<Facet>,
+    octets: Vec<Octet>,
     neighborhoods: Vec<Neighborhood>,
     adjacency: Adjacency,
 }
@@ -150,7 +177,7 @@ impl TriangleMesh {
             Facet {
                 corners: corners(&triangles[id as usize]),
                 normal: normals[id as usize],
-                inward: neighborhood.own,
+                inward: adjacency.own[id as usize],
                 id,
                 patch: adjacency.patches[id as usize],
                 sharp_edges: bits(&sharp_edge),
@@ -159,10 +186,12 @@ impl TriangleMesh {
                 flat_corners: bits(&|i| !adjacency.bent[corner(i)]),
             }
         };
-        let facets = order.iter().map(facet).collect();
+        let facets: Vec<Facet> = order.iter().map(facet).collect();
+        let octets = facets.chunks(OCTET).map(Octet::new).collect();
         let neighborhoods = order.iter().map(|&id| adjacency.triangles[id as usize]).collect();
-        adjacency.triangles = Vec::new();
-        Self { vertices, triangles, sides, tree, facets, neighborhoods, adjacency }
+        (adjacency.triangles, adjacency.own, adjacency.patches) = (Vec::new(), Vec::new(), Vec::new());
+        (adjacency.sharp, adjacency.bent) = (Vec::new(), Vec::new());
+        Self { vertices, triangles, sides, tree, facets, octets, neighborhoods, adjacency }
     }
 
     /// Corner positions, metres.
@@ -230,6 +259,19 @@ impl TriangleMesh {
                 visit(index);
             }
         });
+    }
+
+    /// Calls `visit` with the internal number of every triangle in a leaf of the tree whose box overlaps `aabb`, in
+    /// ascending order.
+    #[inline(always)]
+    pub(crate) fn for_each_candidate(&self, aabb: &Aabb, visit: impl FnMut(usize)) {
+        self.tree.query(aabb, visit);
+    }
+
+    /// Triangles `8 index` to `8 index + 7` by their internal numbers.
+    #[inline(always)]
+    pub(crate) fn octet(&self, index: usize) -> &Octet {
+        &self.octets[index]
     }
 
     /// A triangle by its internal number.

@@ -35,8 +35,6 @@ const SEAM_GAP: Real = 1e-4;
 /// The neighbourhood of one triangle.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Neighborhood {
-    /// Unit vector in the plane of the triangle itself, from edge `i` inwards.
-    pub(super) own: [Vec3; 3],
     /// Unit vector in the plane of the neighbour across edge `i`, at a right angle to the edge and away from it; zero at a boundary.
     pub(crate) inward: [Vec3; 3],
     /// Welded number of corner `i`.
@@ -48,6 +46,8 @@ pub(crate) struct Neighborhood {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Adjacency {
     pub(super) triangles: Vec<Neighborhood>,
+    /// For each triangle the unit vectors in its own plane from its edges inwards.
+    pub(super) own: Vec<[Vec3; 3]>,
     /// For each triangle the smallest number of those it is joined to by flat edges.
     pub(super) patches: Vec<u32>,
     /// For each welded corner whether a convex or open edge ends there.
@@ -69,6 +69,7 @@ impl Adjacency {
                 .iter()
                 .map(|t| Neighborhood { corners: t.map(|i| welded[i as usize]), ..Neighborhood::default() })
                 .collect(),
+            own: vec![[Vec3::ZERO; 3]; triangles.len()],
             patches: (0..triangles.len() as u32).collect(),
             sharp: vec![false; vertices.len()],
             bent: vec![false; vertices.len()],
@@ -121,7 +122,7 @@ impl Adjacency {
         };
         let triangle = &mut self.triangles[side.2 as usize];
         triangle.kinds[side.3 as usize] = kind;
-        triangle.own[side.3 as usize] = own;
+        self.own[side.2 as usize][side.3 as usize] = own;
         if let Some((_, other, inward)) = closest {
             triangle.inward[side.3 as usize] = inward;
             if kind == MeshEdge::Flat {
@@ -165,7 +166,7 @@ impl Adjacency {
                         others.extend([across, -across].into_iter().filter(|u| goes_on(*u)).map(|u| (other, u)));
                     }
                 });
-                let own = self.triangles[index].own[edge];
+                let own = self.own[index][edge];
                 // What folds back onto the triangle itself is a second sheet, not its continuation.
                 let ahead = others.into_iter().filter(|(_, u)| u.dot(own) < 0.99);
                 self.join(&side, normals[index], own, ahead);

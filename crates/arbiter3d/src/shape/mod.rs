@@ -18,7 +18,7 @@ pub use capsule::Capsule;
 pub use cuboid::Cuboid;
 pub use hull::{ConvexHull, HalfEdge, Plane};
 pub use mass::MassProperties;
-pub(crate) use mesh::Facet;
+pub(crate) use mesh::{Facet, OCTET, Octet};
 pub use mesh::{MeshEdge, MeshNode, MeshRayHit, MeshSides, TriangleMesh};
 pub use sphere::Sphere;
 

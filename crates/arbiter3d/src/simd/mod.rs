@@ -1,18 +1,21 @@
 //! Wide numbers and the choice of instruction set at run time.
 //!
-//! A [`Wide<L>`] is a plain array of `L` lanes whose operators are inlined loops. There are no intrinsics: inside a function
-//! that may use AVX2 or AVX-512 the compiler turns the loops into such instructions, elsewhere into SSE2, NEON, simd128 or
-//! scalar ones. One kernel serves all; lanes never mix, so every level gives the same bits.
+//! Kernels are written once over a type of numbers in lanes ([`Lanes`]): registers of SSE2, AVX2 or AVX-512 on x86-64, plain
+//! arrays elsewhere. Lanes never mix and every operation is that of IEEE, so every level gives the same bits.
 //!
 //! [`Instructions::run`] enters a kernel under the instructions of a level. Fused multiply-add is never enabled.
 
 mod pose;
-mod prefetch;
+mod vector;
 mod wide;
+#[cfg(target_arch = "x86_64")]
+mod x86;
 
-pub(crate) use pose::{WidePose, WideRotation};
-pub(crate) use prefetch::{prefetch, prefetch_line};
-pub(crate) use wide::{Wide, WideSymmetric, WideVec3};
+pub(crate) use pose::{WidePose, WideRotation, WideVec3};
+pub(crate) use vector::{LaneRotation, LaneSymmetric, LaneVec3};
+pub(crate) use wide::{Lanes, Number, Quad, Wide};
+#[cfg(target_arch = "x86_64")]
+pub(crate) use x86::{Avx2Lanes, Avx512Lanes, Sse2Lanes};
 
 use std::fmt;
 use std::str::FromStr;
@@ -85,6 +88,23 @@ pub(crate) trait Instructions: Copy + Send + Sync {
     fn run<K: Kernel>(self, kernel: K);
 }
 
+/// Asks for a value to be brought into the cache, for those who know what they will read next and the machine does not.
+#[inline(always)]
+pub(crate) fn prefetch<T>(value: &T) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        const LINE: usize = 64;
+        let start = std::ptr::from_ref(value).cast::<i8>();
+        for offset in (0..size_of::<T>()).step_by(LINE) {
+            // SAFETY: a hint that reads nothing, within the value.
+            unsafe { _mm_prefetch::<_MM_HINT_T0>(start.add(offset)) };
+        }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = value;
+}
+
 /// What every machine of the target has.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Baseline;
@@ -137,6 +157,34 @@ impl Instructions for Avx512 {
     fn run<K: Kernel>(self, kernel: K) {
         // SAFETY: a value exists only after `detect` has found AVX-512 F, DQ and VL, which imply AVX2.
         unsafe { run_avx512(kernel) }
+    }
+}
+
+/// Work on eight lanes at once, whatever the machine has: for kernels too short to be told their level in each step.
+/// Implement `run` as `#[inline(always)]`.
+pub(crate) trait KernelOfEight {
+    /// Does the work.
+    fn run<W: Lanes<8>>(self);
+}
+
+/// Runs a kernel of eight lanes with AVX2 where there is AVX2, else with what every machine has.
+#[inline]
+pub(crate) fn run_eight<K: KernelOfEight>(kernel: K) {
+    #[cfg(target_arch = "x86_64")]
+    if let Some(avx2) = Avx2::detect() {
+        avx2.run(Eight::<K, Avx2Lanes>(kernel, std::marker::PhantomData));
+        return;
+    }
+    kernel.run::<Wide<8>>();
+}
+
+/// A kernel of eight lanes with its lanes chosen.
+struct Eight<K, W>(K, std::marker::PhantomData<W>);
+
+impl<K: KernelOfEight, W: Lanes<8>> Kernel for Eight<K, W> {
+    #[inline(always)]
+    fn run(self) {
+        self.0.run::<W>();
     }
 }
 

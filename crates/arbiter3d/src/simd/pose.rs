@@ -1,7 +1,10 @@
 //! Lanes of rotations and poses, each lane with the operations and their order of [`Rotation`] and [`Pose`].
 
-use super::{Wide, WideVec3};
+use super::{LaneVec3, Number, Wide};
 use crate::math::{Pose, Rotation};
+
+/// `L` vectors side by side.
+pub(crate) type WideVec3<const L: usize> = LaneVec3<Wide<L>>;
 
 /// `L` unit quaternions side by side.
 #[derive(Clone, Copy, Debug)]

@@ -1,66 +1,174 @@
-//! Lanes of floats, vectors and symmetric matrices with the operations of the solver, each lane on its own.
+//! What kernels compute with: numbers in lanes.
+//!
+//! A kernel is written once over a type `W` that stands for `L` numbers side by side. [`Number`] is its arithmetic, [`Lanes`]
+//! the way in and out. The plain array [`Wide`] serves every machine; x86-64 has register types of its own (see `x86`), since
+//! compilers turn loops over arrays into such instructions only sometimes: passes of the solver took a third longer.
 
-use crate::math::Vec3;
 use std::array::from_fn;
+use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Index, IndexMut, Mul, Neg, Sub, SubAssign};
 
-/// `L` numbers side by side.
+/// Four numbers of a record.
+pub(crate) type Quad = [f32; 4];
+
+/// Arithmetic of IEEE numbers side by side, each lane on its own.
+pub(crate) trait Number:
+    Copy
+    + Debug
+    + Send
+    + Sync
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+    + AddAssign
+    + SubAssign
+{
+    const ZERO: Self;
+
+    /// The same in all lanes.
+    fn splat(x: f32) -> Self;
+
+    /// Square root.
+    fn sqrt(self) -> Self;
+
+    /// `other` unless `self < other`.
+    fn min(self, other: Self) -> Self;
+
+    /// `other` unless `self > other`.
+    fn max(self, other: Self) -> Self;
+
+    /// In each lane `yes` where `self > 0`, else `no`.
+    fn if_positive(self, yes: Self, no: Self) -> Self;
+
+    /// In each lane `yes` where `self >= other`, else `no`.
+    fn if_at_least(self, other: Self, yes: Self, no: Self) -> Self;
+
+    /// In each lane `yes` where `self > other`, else `no`.
+    fn if_above(self, other: Self, yes: Self, no: Self) -> Self;
+
+    /// Without its sign.
+    fn abs(self) -> Self;
+
+    /// `1 / self` where `self > 0`, else 0.
+    #[inline(always)]
+    fn inverse_or_zero(self) -> Self {
+        self.if_positive(Self::splat(1.0) / self, Self::ZERO)
+    }
+}
+
+/// Numbers in `L` lanes.
+pub(crate) trait Lanes<const L: usize>: Number {
+    fn from_array(array: [f32; L]) -> Self;
+
+    fn to_array(self) -> [f32; L];
+
+    /// Number `k` of each record as column `k`.
+    fn load(records: &[&Quad; L]) -> [Self; 4];
+
+    /// The records that have these columns: undoes [`Lanes::load`].
+    fn store(columns: &[Self; 4]) -> [Quad; L];
+
+    /// One lane.
+    #[inline(always)]
+    fn get(&self, lane: usize) -> f32 {
+        self.to_array()[lane]
+    }
+
+    /// Changes one lane.
+    #[inline(always)]
+    fn set(&mut self, lane: usize, x: f32) {
+        let mut array = self.to_array();
+        array[lane] = x;
+        *self = Self::from_array(array);
+    }
+
+    /// Group `k` of each record as four columns.
+    #[inline(always)]
+    fn load_quad<const N: usize>(records: &[&[Quad; N]; L], k: usize) -> [Self; 4] {
+        let mut quads = [&[0.0; 4]; L];
+        for (quad, record) in quads.iter_mut().zip(records) {
+            *quad = &record[k];
+        }
+        Self::load(&quads)
+    }
+}
+
+/// `L` numbers side by side in a plain array: what a machine without a register type of its own here uses.
 #[derive(Clone, Copy, Debug)]
 #[repr(transparent)]
 pub(crate) struct Wide<const L: usize>(pub [f32; L]);
 
-impl<const L: usize> Wide<L> {
-    pub const ZERO: Self = Self([0.0; L]);
+impl<const L: usize> Number for Wide<L> {
+    const ZERO: Self = Self([0.0; L]);
 
     #[inline(always)]
-    pub fn splat(x: f32) -> Self {
+    fn splat(x: f32) -> Self {
         Self([x; L])
     }
 
     #[inline(always)]
-    pub fn sqrt(self) -> Self {
+    fn sqrt(self) -> Self {
         Self(from_fn(|i| self.0[i].sqrt()))
     }
 
-    /// `other` unless `self < other`.
     #[inline(always)]
-    pub fn min(self, other: Self) -> Self {
+    fn min(self, other: Self) -> Self {
         Self(from_fn(|i| if self.0[i] < other.0[i] { self.0[i] } else { other.0[i] }))
     }
 
-    /// `other` unless `self > other`.
     #[inline(always)]
-    pub fn max(self, other: Self) -> Self {
+    fn max(self, other: Self) -> Self {
         Self(from_fn(|i| if self.0[i] > other.0[i] { self.0[i] } else { other.0[i] }))
     }
 
-    /// In each lane `yes` where `self > 0`, else `no`.
     #[inline(always)]
-    pub fn if_positive(self, yes: Self, no: Self) -> Self {
+    fn if_positive(self, yes: Self, no: Self) -> Self {
         Self(from_fn(|i| if self.0[i] > 0.0 { yes.0[i] } else { no.0[i] }))
     }
 
-    /// In each lane `yes` where `self > other`, else `no`.
     #[inline(always)]
-    pub fn if_greater(self, other: Self, yes: Self, no: Self) -> Self {
+    fn if_at_least(self, other: Self, yes: Self, no: Self) -> Self {
+        Self(from_fn(|i| if self.0[i] >= other.0[i] { yes.0[i] } else { no.0[i] }))
+    }
+
+    #[inline(always)]
+    fn if_above(self, other: Self, yes: Self, no: Self) -> Self {
         Self(from_fn(|i| if self.0[i] > other.0[i] { yes.0[i] } else { no.0[i] }))
     }
 
-    /// In each lane `yes` where `self` is zero of either sign, else `no`.
     #[inline(always)]
-    pub fn if_zero(self, yes: Self, no: Self) -> Self {
-        Self(from_fn(|i| if self.0[i] == 0.0 { yes.0[i] } else { no.0[i] }))
-    }
-
-    #[inline(always)]
-    pub fn abs(self) -> Self {
+    fn abs(self) -> Self {
         Self(from_fn(|i| self.0[i].abs()))
     }
+}
 
-    /// `1 / self` where `self > 0`, else 0.
+impl<const L: usize> Lanes<L> for Wide<L> {
     #[inline(always)]
-    pub fn inverse_or_zero(self) -> Self {
-        Self(from_fn(|i| if self.0[i] > 0.0 { 1.0 / self.0[i] } else { 0.0 }))
+    fn from_array(array: [f32; L]) -> Self {
+        Self(array)
+    }
+
+    #[inline(always)]
+    fn to_array(self) -> [f32; L] {
+        self.0
+    }
+
+    #[inline(always)]
+    fn load(records: &[&Quad; L]) -> [Self; 4] {
+        let mut columns = [Self::ZERO; 4];
+        for (lane, record) in records.iter().enumerate() {
+            for k in 0..4 {
+                columns[k].0[lane] = record[k];
+            }
+        }
+        columns
+    }
+
+    #[inline(always)]
+    fn store(columns: &[Self; 4]) -> [Quad; L] {
+        from_fn(|lane| from_fn(|k| columns[k].0[lane]))
     }
 }
 
@@ -114,138 +222,5 @@ impl<const L: usize> IndexMut<usize> for Wide<L> {
     #[inline(always)]
     fn index_mut(&mut self, lane: usize) -> &mut f32 {
         &mut self.0[lane]
-    }
-}
-
-/// `L` vectors side by side.
-#[derive(Clone, Copy, Debug)]
-#[repr(C)]
-pub(crate) struct WideVec3<const L: usize> {
-    pub x: Wide<L>,
-    pub y: Wide<L>,
-    pub z: Wide<L>,
-}
-
-impl<const L: usize> WideVec3<L> {
-    pub const ZERO: Self = Self { x: Wide::ZERO, y: Wide::ZERO, z: Wide::ZERO };
-
-    #[inline(always)]
-    pub fn set(&mut self, lane: usize, v: Vec3) {
-        self.x[lane] = v.x;
-        self.y[lane] = v.y;
-        self.z[lane] = v.z;
-    }
-
-    #[inline(always)]
-    pub fn get(&self, lane: usize) -> Vec3 {
-        Vec3::new(self.x[lane], self.y[lane], self.z[lane])
-    }
-
-    /// The three coordinates.
-    #[inline(always)]
-    pub fn columns(&self) -> [Wide<L>; 3] {
-        [self.x, self.y, self.z]
-    }
-
-    #[inline(always)]
-    pub fn dot(&self, o: &Self) -> Wide<L> {
-        self.x * o.x + self.y * o.y + self.z * o.z
-    }
-
-    #[inline(always)]
-    pub fn cross(&self, o: &Self) -> Self {
-        Self { x: self.y * o.z - self.z * o.y, y: self.z * o.x - self.x * o.z, z: self.x * o.y - self.y * o.x }
-    }
-
-    #[inline(always)]
-    pub fn scale(&self, s: Wide<L>) -> Self {
-        Self { x: self.x * s, y: self.y * s, z: self.z * s }
-    }
-
-    /// `self + o · s`.
-    #[inline(always)]
-    pub fn add_scaled(&self, o: &Self, s: Wide<L>) -> Self {
-        Self { x: self.x + o.x * s, y: self.y + o.y * s, z: self.z + o.z * s }
-    }
-
-    /// `self − o · s`.
-    #[inline(always)]
-    pub fn sub_scaled(&self, o: &Self, s: Wide<L>) -> Self {
-        Self { x: self.x - o.x * s, y: self.y - o.y * s, z: self.z - o.z * s }
-    }
-}
-
-impl<const L: usize> Add for WideVec3<L> {
-    type Output = Self;
-    #[inline(always)]
-    fn add(self, o: Self) -> Self {
-        Self { x: self.x + o.x, y: self.y + o.y, z: self.z + o.z }
-    }
-}
-
-impl<const L: usize> Sub for WideVec3<L> {
-    type Output = Self;
-    #[inline(always)]
-    fn sub(self, o: Self) -> Self {
-        Self { x: self.x - o.x, y: self.y - o.y, z: self.z - o.z }
-    }
-}
-
-/// `L` symmetric matrices side by side.
-#[derive(Clone, Copy, Debug)]
-#[repr(C)]
-pub(crate) struct WideSymmetric<const L: usize> {
-    pub xx: Wide<L>,
-    pub yy: Wide<L>,
-    pub zz: Wide<L>,
-    pub xy: Wide<L>,
-    pub xz: Wide<L>,
-    pub yz: Wide<L>,
-}
-
-impl<const L: usize> WideSymmetric<L> {
-    pub const ZERO: Self =
-        Self { xx: Wide::ZERO, yy: Wide::ZERO, zz: Wide::ZERO, xy: Wide::ZERO, xz: Wide::ZERO, yz: Wide::ZERO };
-
-    #[inline(always)]
-    pub fn mul(&self, v: &WideVec3<L>) -> WideVec3<L> {
-        WideVec3 {
-            x: self.xx * v.x + self.xy * v.y + self.xz * v.z,
-            y: self.xy * v.x + self.yy * v.y + self.yz * v.z,
-            z: self.xz * v.x + self.yz * v.y + self.zz * v.z,
-        }
-    }
-
-    #[inline(always)]
-    pub fn add(&self, o: &Self) -> Self {
-        Self {
-            xx: self.xx + o.xx,
-            yy: self.yy + o.yy,
-            zz: self.zz + o.zz,
-            xy: self.xy + o.xy,
-            xz: self.xz + o.xz,
-            yz: self.yz + o.yz,
-        }
-    }
-
-    /// `x` with `self · x = v`, by cofactors; zero where the matrix is singular.
-    #[inline(always)]
-    pub fn solve(&self, v: &WideVec3<L>) -> WideVec3<L> {
-        let (c00, c01, c02) = (
-            self.yy * self.zz - self.yz * self.yz,
-            self.xz * self.yz - self.xy * self.zz,
-            self.xy * self.yz - self.xz * self.yy,
-        );
-        let (c11, c12, c22) = (
-            self.xx * self.zz - self.xz * self.xz,
-            self.xy * self.xz - self.xx * self.yz,
-            self.xx * self.yy - self.xy * self.xy,
-        );
-        let s = (self.xx * c00 + self.xy * c01 + self.xz * c02).inverse_or_zero();
-        WideVec3 {
-            x: (c00 * v.x + c01 * v.y + c02 * v.z) * s,
-            y: (c01 * v.x + c11 * v.y + c12 * v.z) * s,
-            z: (c02 * v.x + c12 * v.y + c22 * v.z) * s,
-        }
     }
 }

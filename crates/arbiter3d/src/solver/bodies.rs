@@ -6,7 +6,7 @@
 
 use crate::math::{Pose, Real, Rotation, SymmetricMat3, Vec3};
 use crate::parallel::SharedSlice;
-use crate::simd::{Wide, WideVec3};
+use crate::simd::{LaneVec3, Lanes, Quad};
 
 /// Marks a body index in a row whose body is not to be written.
 pub(crate) const READ_ONLY: u32 = 1 << 31;
@@ -22,24 +22,46 @@ pub(crate) struct BodyState {
     pub angular_velocity: Vec3,
     pub translation: Vec3,
     pub turn: Vec3,
-    /// Whether a row acts on the body in this step.
-    pub constrained: u32,
+    /// 1 if a row acts on the body in this step, else 0.
+    pub constrained: Real,
     /// Whether contacts can move the body at all: dynamic, enabled, not locked on all axes.
     pub moves: u32,
     unused: [u32; 2],
 }
 
+impl BodyState {
+    /// A body that rests and is not there.
+    pub const NONE: Self = Self {
+        linear_velocity: Vec3::ZERO,
+        angular_velocity: Vec3::ZERO,
+        translation: Vec3::ZERO,
+        turn: Vec3::ZERO,
+        constrained: 0.0,
+        moves: 0,
+        unused: [0; 2],
+    };
+}
+
 impl Default for BodyState {
     fn default() -> Self {
-        Self {
-            linear_velocity: Vec3::ZERO,
-            angular_velocity: Vec3::ZERO,
-            translation: Vec3::ZERO,
-            turn: Vec3::ZERO,
-            constrained: 0,
-            moves: 0,
-            unused: [0; 2],
-        }
+        Self::NONE
+    }
+}
+
+impl BodyState {
+    /// The record as groups of four numbers, the first three of which are its twelve.
+    #[inline(always)]
+    pub fn quads(&self) -> &[Quad; 4] {
+        const { assert!(size_of::<Self>() == size_of::<[Quad; 4]>()) };
+        // SAFETY: `repr(C)`, of equal size, and any bits are a float.
+        unsafe { &*std::ptr::from_ref(self).cast() }
+    }
+
+    /// The same, to change; the fourth group is to be left alone.
+    #[inline(always)]
+    pub fn quads_mut(&mut self) -> &mut [Quad; 4] {
+        // SAFETY: as above, and any bits are an integer.
+        unsafe { &mut *std::ptr::from_mut(self).cast() }
     }
 }
 
@@ -56,18 +78,38 @@ pub(crate) struct BodyMass {
     pub inverse_inertia: SymmetricMat3,
 }
 
+impl BodyMass {
+    /// A body at the origin that nothing moves.
+    pub const NONE: Self = Self {
+        center: Vec3::ZERO,
+        rotation: Rotation::IDENTITY,
+        inverse_mass: Vec3::ZERO,
+        inverse_inertia: SymmetricMat3::ZERO,
+    };
+}
+
 impl Default for BodyMass {
     fn default() -> Self {
-        Self {
-            center: Vec3::ZERO,
-            rotation: Rotation::IDENTITY,
-            inverse_mass: Vec3::ZERO,
-            inverse_inertia: SymmetricMat3::ZERO,
-        }
+        Self::NONE
     }
 }
 
 impl BodyMass {
+    /// The record as groups of four numbers.
+    #[inline(always)]
+    pub fn quads(&self) -> &[Quad; 4] {
+        const { assert!(size_of::<Self>() == size_of::<[Quad; 4]>()) };
+        // SAFETY: `repr(C)`, sixteen floats.
+        unsafe { &*std::ptr::from_ref(self).cast() }
+    }
+
+    /// The same, to change.
+    #[inline(always)]
+    pub fn quads_mut(&mut self) -> &mut [Quad; 4] {
+        // SAFETY: as above.
+        unsafe { &mut *std::ptr::from_mut(self).cast() }
+    }
+
     /// Pose of the frame at the centre of mass.
     #[inline(always)]
     pub fn pose(&self) -> Pose {
@@ -75,50 +117,67 @@ impl BodyMass {
     }
 }
 
-/// What the integrator needs.
+/// What the integrator needs: 128 bytes, in groups of four numbers as it loads them.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct BodyMotion {
     /// Velocities before this substep's contact impulses; what they added is warm starting for the next substep.
     pub free_linear: Vec3,
+    pub linear_damping: Real,
     pub free_angular: Vec3,
+    pub angular_damping: Real,
     /// Acceleration by gravity and forces in this step.
     pub acceleration: Vec3,
+    /// 1 if nothing but its velocity moves it, else 0.
+    pub kinematic: Real,
     pub angular_acceleration: Vec3,
+    /// 1 if the torque-free spin changes, else 0: the inertia is not that of a ball, and no rotation is locked.
+    pub gyroscopic: Real,
     /// What rounding has lost when gravity was added, to be added later (Kahan).
     pub residual: Vec3,
+    /// 1 if a velocity overflowed in this step, else 0.
+    pub broken: Real,
     /// Inertia in body axes and its inverse.
     pub inertia: SymmetricMat3,
     pub inverse_inertia: SymmetricMat3,
-    pub linear_damping: Real,
-    pub angular_damping: Real,
-    /// 1 for each free world axis of rotation.
-    pub free_rotation: Vec3,
-    /// Whether nothing but its velocity moves it.
-    pub kinematic: bool,
-    /// Whether the torque-free spin changes: the inertia is not that of a ball, and no rotation is locked.
-    pub gyroscopic: bool,
-    /// Whether a velocity overflowed in this step.
-    pub broken: bool,
 }
 
 impl Default for BodyMotion {
     fn default() -> Self {
-        Self {
-            free_linear: Vec3::ZERO,
-            free_angular: Vec3::ZERO,
-            acceleration: Vec3::ZERO,
-            angular_acceleration: Vec3::ZERO,
-            residual: Vec3::ZERO,
-            inertia: SymmetricMat3::ZERO,
-            inverse_inertia: SymmetricMat3::ZERO,
-            linear_damping: 0.0,
-            angular_damping: 0.0,
-            free_rotation: Vec3::ONE,
-            kinematic: false,
-            gyroscopic: false,
-            broken: false,
-        }
+        Self::NONE
+    }
+}
+
+impl BodyMotion {
+    /// Nothing that moves.
+    pub const NONE: Self = Self {
+        free_linear: Vec3::ZERO,
+        linear_damping: 0.0,
+        free_angular: Vec3::ZERO,
+        angular_damping: 0.0,
+        acceleration: Vec3::ZERO,
+        kinematic: 0.0,
+        angular_acceleration: Vec3::ZERO,
+        gyroscopic: 0.0,
+        residual: Vec3::ZERO,
+        broken: 0.0,
+        inertia: SymmetricMat3::ZERO,
+        inverse_inertia: SymmetricMat3::ZERO,
+    };
+
+    /// The record as groups of four numbers.
+    #[inline(always)]
+    pub fn quads(&self) -> &[Quad; 8] {
+        const { assert!(size_of::<Self>() == size_of::<[Quad; 8]>()) };
+        // SAFETY: `repr(C)`, 32 floats.
+        unsafe { &*std::ptr::from_ref(self).cast() }
+    }
+
+    /// The same, to change.
+    #[inline(always)]
+    pub fn quads_mut(&mut self) -> &mut [Quad; 8] {
+        // SAFETY: as above.
+        unsafe { &mut *std::ptr::from_mut(self).cast() }
     }
 }
 
@@ -148,16 +207,16 @@ impl SolverBodies {
 
 /// Velocities of the bodies on one side of a wide row.
 #[derive(Clone, Copy)]
-pub(crate) struct WideVelocity<const L: usize> {
-    pub linear: WideVec3<L>,
-    pub angular: WideVec3<L>,
+pub(crate) struct WideVelocity<W> {
+    pub linear: LaneVec3<W>,
+    pub angular: LaneVec3<W>,
 }
 
 /// How far the bodies on one side of a wide row have come in this step.
 #[derive(Clone, Copy)]
-pub(crate) struct WideDisplacement<const L: usize> {
-    pub translation: WideVec3<L>,
-    pub turn: WideVec3<L>,
+pub(crate) struct WideDisplacement<W> {
+    pub translation: LaneVec3<W>,
+    pub turn: LaneVec3<W>,
 }
 
 /// Body states as the passes share them: the rows of one colour touch different bodies.
@@ -168,51 +227,43 @@ pub(crate) type SharedStates<'a> = SharedSlice<'a, BodyState>;
 /// # Safety
 /// No other thread may write the bodies: rows of one colour share no dynamic body, and others are not written.
 #[inline(always)]
-pub(crate) unsafe fn gather<const L: usize>(
+pub(crate) unsafe fn gather<W: Lanes<L>, const L: usize>(
     states: &SharedStates<'_>,
     bodies: &[u32; L],
-) -> (WideVelocity<L>, WideDisplacement<L>) {
-    let mut columns = [Wide::<L>::ZERO; 12];
+) -> (WideVelocity<W>, WideDisplacement<W>) {
+    let mut records = [&[[0.0; 4]; 4]; L];
     for lane in 0..L {
-        // SAFETY: promised by the caller; the reference ends with this iteration.
-        let s = unsafe { &*states.get_mut((bodies[lane] & !READ_ONLY) as usize) };
-        let values = [
-            s.linear_velocity.x,
-            s.linear_velocity.y,
-            s.linear_velocity.z,
-            s.angular_velocity.x,
-            s.angular_velocity.y,
-            s.angular_velocity.z,
-            s.translation.x,
-            s.translation.y,
-            s.translation.z,
-            s.turn.x,
-            s.turn.y,
-            s.turn.z,
-        ];
-        for k in 0..12 {
-            columns[k][lane] = values[k];
-        }
+        // SAFETY: promised by the caller; the references end with this function.
+        records[lane] = unsafe { states.get((bodies[lane] & !READ_ONLY) as usize) }.quads();
     }
-    let [vx, vy, vz, wx, wy, wz, px, py, pz, tx, ty, tz] = columns;
+    let [vx, vy, vz, wx] = W::load_quad(&records, 0);
+    let [wy, wz, px, py] = W::load_quad(&records, 1);
+    let [pz, tx, ty, tz] = W::load_quad(&records, 2);
     (
-        WideVelocity { linear: WideVec3 { x: vx, y: vy, z: vz }, angular: WideVec3 { x: wx, y: wy, z: wz } },
-        WideDisplacement { translation: WideVec3 { x: px, y: py, z: pz }, turn: WideVec3 { x: tx, y: ty, z: tz } },
+        WideVelocity { linear: LaneVec3 { x: vx, y: vy, z: vz }, angular: LaneVec3 { x: wx, y: wy, z: wz } },
+        WideDisplacement { translation: LaneVec3 { x: px, y: py, z: pz }, turn: LaneVec3 { x: tx, y: ty, z: tz } },
     )
 }
 
-/// Stores the velocities of one side; read-only bodies are left alone.
+/// Stores the velocities of one side; read-only bodies are left alone. `displacement` is what [`gather`] gave with them:
+/// half of a group of four numbers that is written whole.
 ///
 /// # Safety
 /// No other thread may touch the bodies without [`READ_ONLY`].
 #[inline(always)]
-pub(crate) unsafe fn scatter<const L: usize>(states: &SharedStates<'_>, bodies: &[u32; L], velocity: &WideVelocity<L>) {
+pub(crate) unsafe fn scatter<W: Lanes<L>, const L: usize>(
+    states: &SharedStates<'_>,
+    bodies: &[u32; L],
+    (velocity, displacement): (&WideVelocity<W>, &WideDisplacement<W>),
+) {
+    let (v, w, p) = (&velocity.linear, &velocity.angular, &displacement.translation);
+    let first = W::store(&[v.x, v.y, v.z, w.x]);
+    let second = W::store(&[w.y, w.z, p.x, p.y]);
     for (lane, &body) in bodies.iter().enumerate() {
         if body & READ_ONLY == 0 {
             // SAFETY: promised by the caller; the reference ends with this iteration.
-            let state = unsafe { states.get_mut(body as usize) };
-            state.linear_velocity = velocity.linear.get(lane);
-            state.angular_velocity = velocity.angular.get(lane);
+            let quads = unsafe { states.get_unchecked_mut(body as usize) }.quads_mut();
+            (quads[0], quads[1]) = (first[lane], second[lane]);
         }
     }
 }

@@ -21,6 +21,9 @@ const OVERFLOW: u8 = 0;
 /// All groups of rows: the overflow, the dynamic colours, the static colours.
 const GROUPS: usize = 1 + DYNAMIC_COLORS + STATIC_COLORS;
 
+/// How many arbiters ahead of their use they are asked for.
+const PREFETCH_AHEAD: usize = 8;
+
 /// Contacts of one arbiter that share a normal: what becomes one lane of a row.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RowSource {
@@ -69,7 +72,11 @@ impl RowPlan {
         self.used.resize(bodies.states.len(), 0);
         self.fixed_rows.resize(bodies.states.len(), 0);
         self.unsorted.clear();
-        for &(_, index) in order {
+        for (i, &(_, index)) in order.iter().enumerate() {
+            if let Some(&(_, later)) = order.get(i + PREFETCH_AHEAD) {
+                crate::simd::prefetch(&arbiters[later as usize].body1);
+                crate::simd::prefetch(&arbiters[later as usize].data.usage_mask);
+            }
             let arbiter = &mut arbiters[index as usize];
             arbiter.data.mark_solved();
             if arbiter.data.usage_mask & 15 != 0 {
@@ -117,8 +124,8 @@ impl RowPlan {
     fn color(&mut self, arbiter: &Arbiter, bodies: &mut SolverBodies) -> u8 {
         let (a, b) = (arbiter.body1.index as usize, arbiter.body2.index as usize);
         let (a_moves, b_moves) = (bodies.states[a].moves != 0, bodies.states[b].moves != 0);
-        bodies.states[a].constrained = 1;
-        bodies.states[b].constrained = 1;
+        bodies.states[a].constrained = 1.0;
+        bodies.states[b].constrained = 1.0;
         if a_moves && b_moves {
             let free = !(self.used[a] | self.used[b]);
             if free == 0 {

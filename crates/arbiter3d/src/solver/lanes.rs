@@ -1,16 +1,18 @@
 //! The solver for one lane count: its rows, and the stages over them.
 
-use super::bodies::{BodyState, SharedStates, SolverBodies};
+use super::bodies::{BodyState, SharedStates};
 use super::coloring::{CLASSES, RowPlan, RowSource};
-use super::prepare::{Outcome, PrepareContext, prepare_row, store_lane};
-use super::rows::{FrictionRow, NormalRow};
-use super::solve::{PassParameters, relax, restitute, solve, warm_start};
+use super::integrate::{IntegrateKernel, IntegrateParameters, IntegrateTarget, Integration};
+use super::prepare::{PrepareContext, RowTarget, SolvedRow, prepare_row, read_row, store_lane};
+use super::rows::{ExtraRow, FrictionRow, NormalRow, RowFeatures};
+use super::solve::{PassParameters, RowPass};
 use crate::arbiter::Arbiter;
 use crate::math::Real;
 use crate::parallel::{SharedSlice, StagePool};
 #[cfg(target_arch = "x86_64")]
-use crate::simd::{Avx2, Avx512};
-use crate::simd::{Baseline, Instructions, Kernel, SimdLevel};
+use crate::simd::{Avx2, Avx2Lanes, Avx512, Avx512Lanes, Sse2Lanes};
+use crate::simd::{Baseline, Instructions, Kernel, Lanes, SimdLevel, Wide, prefetch};
+use std::marker::PhantomData;
 
 /// Wide rows that a thread takes at a time.
 const ROWS_PER_BLOCK: usize = 16;
@@ -39,6 +41,15 @@ pub(crate) trait ContactSolver: Send + Sync {
         pool: &mut StagePool,
     );
 
+    /// Integrates velocities or positions of bodies.
+    fn integrate(
+        &self,
+        phase: Integration,
+        target: IntegrateTarget<'_>,
+        parameters: &IntegrateParameters,
+        pool: &mut StagePool,
+    );
+
     /// Writes impulses and gaps back to the arbiters; notes in `may_break` (by row of the plan) whose contacts to test.
     fn store(&mut self, target: StoreTarget<'_>, pool: &mut StagePool);
 }
@@ -47,7 +58,7 @@ pub(crate) trait ContactSolver: Send + Sync {
 pub(crate) struct StoreTarget<'a> {
     pub plan: &'a RowPlan,
     pub arbiters: &'a mut [Arbiter],
-    pub bodies: &'a SolverBodies,
+    pub states: &'a mut [BodyState],
     pub break_distance: Real,
     pub may_break: &'a mut [bool],
 }
@@ -55,28 +66,42 @@ pub(crate) struct StoreTarget<'a> {
 /// The solver for a level.
 pub(crate) fn contact_solver(level: SimdLevel) -> Box<dyn ContactSolver> {
     match level {
-        SimdLevel::Scalar => Box::new(LaneSolver::<Baseline, 1>::new(Baseline)),
+        SimdLevel::Scalar => Box::new(LaneSolver::<_, Wide<1>, 1>::new(Baseline)),
         #[cfg(target_arch = "x86_64")]
-        SimdLevel::Avx2 if let Some(avx2) = Avx2::detect() => Box::new(LaneSolver::<Avx2, 8>::new(avx2)),
+        SimdLevel::Avx2 if let Some(avx2) = Avx2::detect() => Box::new(LaneSolver::<_, Avx2Lanes, 8>::new(avx2)),
         #[cfg(target_arch = "x86_64")]
-        SimdLevel::Avx512 if let Some(avx512) = Avx512::detect() => Box::new(LaneSolver::<Avx512, 16>::new(avx512)),
-        _ => Box::new(LaneSolver::<Baseline, 4>::new(Baseline)),
+        SimdLevel::Avx512 if let Some(avx512) = Avx512::detect() => {
+            Box::new(LaneSolver::<_, Avx512Lanes, 16>::new(avx512))
+        }
+        #[cfg(target_arch = "x86_64")]
+        _ => Box::new(LaneSolver::<_, Sse2Lanes, 4>::new(Baseline)),
+        #[cfg(not(target_arch = "x86_64"))]
+        _ => Box::new(LaneSolver::<_, Wide<4>, 4>::new(Baseline)),
     }
 }
 
 /// Wide rows of one class.
-struct RowSet<const L: usize, const P: usize, const C: usize> {
-    normals: Vec<NormalRow<L, P, C>>,
-    frictions: Vec<FrictionRow<L, P>>,
+struct RowSet<W, const L: usize, const P: usize, const C: usize> {
+    normals: Vec<NormalRow<W, L, P, C>>,
+    frictions: Vec<FrictionRow<W, P>>,
+    extras: Vec<ExtraRow<W, P>>,
+    features: Vec<RowFeatures>,
     /// First source of each wide row, and how many there are.
     sources: Vec<(u32, u32)>,
     /// Wide rows of each group.
     groups: Vec<(u32, u32)>,
 }
 
-impl<const L: usize, const P: usize, const C: usize> RowSet<L, P, C> {
+impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> RowSet<W, L, P, C> {
     const fn new() -> Self {
-        Self { normals: Vec::new(), frictions: Vec::new(), sources: Vec::new(), groups: Vec::new() }
+        Self {
+            normals: Vec::new(),
+            frictions: Vec::new(),
+            extras: Vec::new(),
+            features: Vec::new(),
+            sources: Vec::new(),
+            groups: Vec::new(),
+        }
     }
 
     /// Cuts the plan's rows of one class into wide rows; rows of a serial group stand alone.
@@ -96,52 +121,101 @@ impl<const L: usize, const P: usize, const C: usize> RowSet<L, P, C> {
             self.groups.push((first, self.sources.len() as u32));
         }
         // Rows are overwritten whole by `prepare_row`: only new ones need a value.
-        if self.normals.len() < self.sources.len() {
-            self.normals.resize(self.sources.len(), NormalRow::EMPTY);
-            self.frictions.resize(self.sources.len(), FrictionRow::EMPTY);
+        let count = self.sources.len();
+        if self.normals.len() < count {
+            self.normals.resize(count, NormalRow::EMPTY);
+            self.frictions.resize(count, FrictionRow::EMPTY);
+            self.extras.resize(count, ExtraRow::EMPTY);
+            self.features.resize(count, RowFeatures::default());
         }
     }
 
-    fn prepare<I: Instructions>(
-        &mut self,
-        plan: &RowPlan,
-        context: &PrepareContext<'_>,
-        level: I,
-        pool: &mut StagePool,
-    ) {
-        let count = self.sources.len();
-        let normals = SharedSlice::new(&mut self.normals);
-        let frictions = SharedSlice::new(&mut self.frictions);
-        let sources = &self.sources;
-        pool.run(count.div_ceil(ROWS_PER_BLOCK), |block| {
-            let (start, end) = block_range(block, 0, count);
-            // SAFETY: blocks do not overlap.
-            let (normals, frictions) = unsafe { (normals.range_mut(start, end), frictions.range_mut(start, end)) };
-            level.run(PrepareKernel { normals, frictions, sources: &sources[start..end], rows: &plan.rows, context });
-        });
+    /// Shares the wide rows of `range` among threads.
+    fn share(&mut self, range: (usize, usize)) -> SharedRows<'_, W, L, P, C> {
+        SharedRows {
+            normals: SharedSlice::new(&mut self.normals),
+            frictions: SharedSlice::new(&mut self.frictions),
+            extras: SharedSlice::new(&mut self.extras),
+            features: SharedSlice::new(&mut self.features),
+            sources: &self.sources,
+            range,
+        }
+    }
+
+    /// Whether some row may bounce.
+    fn bounces(&self) -> bool {
+        self.features[..self.sources.len()].iter().any(|features| features.restitution)
     }
 }
 
-/// Wide rows of a block.
-fn block_range(block: usize, first: usize, last: usize) -> (usize, usize) {
-    let start = first + block * ROWS_PER_BLOCK;
-    (start, (start + ROWS_PER_BLOCK).min(last))
+/// A run of wide rows as the threads share them, block by block.
+struct SharedRows<'a, W, const L: usize, const P: usize, const C: usize> {
+    normals: SharedSlice<'a, NormalRow<W, L, P, C>>,
+    frictions: SharedSlice<'a, FrictionRow<W, P>>,
+    extras: SharedSlice<'a, ExtraRow<W, P>>,
+    features: SharedSlice<'a, RowFeatures>,
+    sources: &'a [(u32, u32)],
+    range: (usize, usize),
 }
 
-struct PrepareKernel<'a, const L: usize, const P: usize, const C: usize> {
-    normals: &'a mut [NormalRow<L, P, C>],
-    frictions: &'a mut [FrictionRow<L, P>],
+impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> SharedRows<'_, W, L, P, C> {
+    fn blocks(&self) -> usize {
+        (self.range.1 - self.range.0).div_ceil(ROWS_PER_BLOCK)
+    }
+
+    /// The rows of a block.
+    ///
+    /// # Safety
+    /// Each block may be held once at a time.
+    unsafe fn block(&self, block: usize) -> Rows<'_, W, L, P, C> {
+        let start = self.range.0 + block * ROWS_PER_BLOCK;
+        let end = (start + ROWS_PER_BLOCK).min(self.range.1);
+        // SAFETY: blocks do not overlap, and each is held once by the caller's promise.
+        unsafe {
+            Rows {
+                normals: self.normals.range_mut(start, end),
+                frictions: self.frictions.range_mut(start, end),
+                extras: self.extras.range_mut(start, end),
+                features: self.features.range_mut(start, end),
+                sources: &self.sources[start..end],
+            }
+        }
+    }
+}
+
+/// The wide rows of a block.
+struct Rows<'a, W, const L: usize, const P: usize, const C: usize> {
+    normals: &'a mut [NormalRow<W, L, P, C>],
+    frictions: &'a mut [FrictionRow<W, P>],
+    extras: &'a mut [ExtraRow<W, P>],
+    features: &'a mut [RowFeatures],
     sources: &'a [(u32, u32)],
+}
+
+struct PrepareKernel<'a, W, const L: usize, const P: usize, const C: usize> {
+    block: Rows<'a, W, L, P, C>,
     rows: &'a [RowSource],
     context: &'a PrepareContext<'a>,
 }
 
-impl<const L: usize, const P: usize, const C: usize> Kernel for PrepareKernel<'_, L, P, C> {
+impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> Kernel for PrepareKernel<'_, W, L, P, C> {
     #[inline(always)]
     fn run(self) {
-        for (i, &(first, count)) in self.sources.iter().enumerate() {
+        let block = self.block;
+        for (i, &(first, count)) in block.sources.iter().enumerate() {
+            if let Some(&(first, count)) = block.sources.get(i + 1) {
+                for source in &self.rows[first as usize..(first + count) as usize] {
+                    prefetch(&self.context.arbiters[source.arbiter as usize]);
+                }
+            }
+            let target = RowTarget {
+                row: &mut block.normals[i],
+                friction: &mut block.frictions[i],
+                extra: &mut block.extras[i],
+                features: &mut block.features[i],
+            };
             let sources = &self.rows[first as usize..(first + count) as usize];
-            prepare_row(&mut self.normals[i], &mut self.frictions[i], sources, self.context);
+            prepare_row(target, sources, self.context);
         }
     }
 }
@@ -150,78 +224,74 @@ impl<const L: usize, const P: usize, const C: usize> Kernel for PrepareKernel<'_
 struct StoreShared<'a> {
     rows: &'a [RowSource],
     arbiters: SharedSlice<'a, Arbiter>,
-    bodies: &'a SolverBodies,
+    states: SharedStates<'a>,
     break_distance: Real,
     may_break: SharedSlice<'a, bool>,
 }
 
-struct StoreKernel<'a, const L: usize, const P: usize, const C: usize> {
-    normals: &'a [NormalRow<L, P, C>],
-    frictions: &'a [FrictionRow<L, P>],
-    sources: &'a [(u32, u32)],
+struct StoreKernel<'a, W, const L: usize, const P: usize, const C: usize> {
+    block: Rows<'a, W, L, P, C>,
     target: &'a StoreShared<'a>,
 }
 
-impl<const L: usize, const P: usize, const C: usize> Kernel for StoreKernel<'_, L, P, C> {
+impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> Kernel for StoreKernel<'_, W, L, P, C> {
     #[inline(always)]
     fn run(self) {
-        let target = self.target;
-        for (i, &(first, count)) in self.sources.iter().enumerate() {
+        let (target, block) = (self.target, self.block);
+        for (i, &(first, count)) in block.sources.iter().enumerate() {
+            if let Some(&(first, count)) = block.sources.get(i + 1) {
+                for source in &target.rows[first as usize..(first + count) as usize] {
+                    target.arbiters.prefetch(source.arbiter as usize);
+                }
+            }
+            let solved = SolvedRow {
+                row: &block.normals[i],
+                friction: &block.frictions[i],
+                extra: &block.extras[i],
+                features: block.features[i],
+            };
+            // SAFETY: storing writes no states.
+            let outcome = unsafe { read_row(&solved, &target.states, target.break_distance) };
             for lane in 0..count as usize {
                 let row = first as usize + lane;
                 let source = &target.rows[row];
                 // SAFETY: rows of one arbiter share its bodies, so they stand in different groups, and groups are stored
                 // one after the other; those of the serial group are stored by one thread.
                 let arbiter = unsafe { target.arbiters.get_mut(source.arbiter as usize) };
-                let outcome = store_lane(
-                    (&self.normals[i], &self.frictions[i]),
-                    lane,
-                    source,
-                    (arbiter, target.bodies),
-                    target.break_distance,
-                );
+                store_lane(&outcome, &solved, lane, source, arbiter);
                 // SAFETY: each row belongs to one block alone.
-                *unsafe { target.may_break.get_mut(row) } = outcome == Outcome::MayBreak;
+                *unsafe { target.may_break.get_mut(row) } = outcome.excess[lane] > 0.0;
             }
         }
     }
 }
 
-struct PassKernel<'a, const L: usize, const P: usize, const C: usize> {
-    normals: &'a mut [NormalRow<L, P, C>],
-    frictions: &'a mut [FrictionRow<L, P>],
+struct PassKernel<'a, W, const L: usize, const P: usize, const C: usize> {
+    block: Rows<'a, W, L, P, C>,
     pass: Pass,
     states: &'a SharedStates<'a>,
     parameters: &'a PassParameters,
 }
 
-impl<const L: usize, const P: usize, const C: usize> Kernel for PassKernel<'_, L, P, C> {
+impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> Kernel for PassKernel<'_, W, L, P, C> {
     #[inline(always)]
     fn run(self) {
-        let rows = self.normals.iter_mut().zip(self.frictions.iter_mut());
-        match self.pass {
-            Pass::WarmStart => {
-                for (row, friction) in rows {
-                    // SAFETY: rows of one colour share no dynamic body, and each block runs on one thread.
-                    unsafe { warm_start(row, friction, self.states) };
-                }
-            }
-            Pass::Solve => {
-                for (row, _) in rows {
-                    // SAFETY: as above.
-                    unsafe { solve(row, self.states, self.parameters) };
-                }
-            }
-            Pass::Relax => {
-                for (row, friction) in rows {
-                    // SAFETY: as above.
-                    unsafe { relax(row, friction, self.states, self.parameters) };
-                }
-            }
-            Pass::Restitution => {
-                for (row, friction) in rows {
-                    // SAFETY: as above.
-                    unsafe { restitute(row, friction, self.states, self.parameters) };
+        let (block, parameters) = (self.block, self.parameters);
+        for i in 0..block.sources.len() {
+            let row = RowPass {
+                row: &mut block.normals[i],
+                friction: &mut block.frictions[i],
+                extra: &mut block.extras[i],
+                features: block.features[i],
+                states: self.states,
+            };
+            // SAFETY: rows of one colour share no dynamic body, and each block runs on one thread.
+            unsafe {
+                match self.pass {
+                    Pass::WarmStart => row.warm_start(),
+                    Pass::Solve => row.solve(parameters),
+                    Pass::Relax => row.relax(parameters),
+                    Pass::Restitution => row.restitute(parameters),
                 }
             }
         }
@@ -229,77 +299,31 @@ impl<const L: usize, const P: usize, const C: usize> Kernel for PassKernel<'_, L
 }
 
 /// Rows for `L` lanes, by class.
-struct LaneSolver<I, const L: usize> {
+struct LaneSolver<I, W, const L: usize> {
     level: I,
-    one: RowSet<L, 1, 0>,
-    two: RowSet<L, 2, 1>,
-    four: RowSet<L, 4, 6>,
+    one: RowSet<W, L, 1, 0>,
+    two: RowSet<W, L, 2, 1>,
+    four: RowSet<W, L, 4, 6>,
     /// Groups whose rows share bodies.
     serial: Vec<bool>,
+    /// Whether some row may bounce.
+    bounces: bool,
 }
 
-impl<I: Instructions, const L: usize> LaneSolver<I, L> {
+impl<I: Instructions, W: Lanes<L>, const L: usize> LaneSolver<I, W, L> {
     const fn new(level: I) -> Self {
-        Self { level, serial: Vec::new(), one: RowSet::new(), two: RowSet::new(), four: RowSet::new() }
-    }
-}
-
-/// The wide rows of one class in one group, as the threads share them.
-struct GroupRows<'a, const L: usize, const P: usize, const C: usize> {
-    normals: SharedSlice<'a, NormalRow<L, P, C>>,
-    frictions: SharedSlice<'a, FrictionRow<L, P>>,
-    sources: &'a [(u32, u32)],
-    range: (usize, usize),
-}
-
-impl<'a, const L: usize, const P: usize, const C: usize> GroupRows<'a, L, P, C> {
-    fn new(set: &'a mut RowSet<L, P, C>, group: usize) -> Self {
-        let (start, end) = set.groups[group];
-        Self {
-            normals: SharedSlice::new(&mut set.normals),
-            frictions: SharedSlice::new(&mut set.frictions),
-            sources: &set.sources,
-            range: (start as usize, end as usize),
-        }
-    }
-
-    fn blocks(&self) -> usize {
-        (self.range.1 - self.range.0).div_ceil(ROWS_PER_BLOCK)
-    }
-
-    /// Runs a pass over one block.
-    fn run<I: Instructions>(
-        &self,
-        block: usize,
-        pass: Pass,
-        states: &SharedStates<'_>,
-        (level, parameters): (I, &PassParameters),
-    ) {
-        let (start, end) = block_range(block, self.range.0, self.range.1);
-        // SAFETY: blocks do not overlap, and each is run once.
-        let (normals, frictions) =
-            unsafe { (self.normals.range_mut(start, end), self.frictions.range_mut(start, end)) };
-        level.run(PassKernel { normals, frictions, pass, states, parameters });
-    }
-
-    /// Stores one block.
-    fn store<I: Instructions>(&self, block: usize, level: I, target: &StoreShared<'_>) {
-        let (start, end) = block_range(block, self.range.0, self.range.1);
-        // SAFETY: blocks do not overlap, and each is run once.
-        let (normals, frictions) =
-            unsafe { (&*self.normals.range_mut(start, end), &*self.frictions.range_mut(start, end)) };
-        level.run(StoreKernel { normals, frictions, sources: &self.sources[start..end], target });
+        Self { level, serial: Vec::new(), bounces: false, one: RowSet::new(), two: RowSet::new(), four: RowSet::new() }
     }
 }
 
 /// The three classes of a group.
-struct Group<'a, const L: usize> {
-    one: GroupRows<'a, L, 1, 0>,
-    two: GroupRows<'a, L, 2, 1>,
-    four: GroupRows<'a, L, 4, 6>,
+struct Group<'a, W, const L: usize> {
+    one: SharedRows<'a, W, L, 1, 0>,
+    two: SharedRows<'a, W, L, 2, 1>,
+    four: SharedRows<'a, W, L, 4, 6>,
 }
 
-impl<const L: usize> Group<'_, L> {
+impl<W: Lanes<L>, const L: usize> Group<'_, W, L> {
     /// Calls `visit` with each block of each class: on all threads, or in order on this one where rows share bodies.
     fn for_each_block(&self, serial: bool, pool: &mut StagePool, visit: impl Fn(usize, usize) + Sync) {
         let (ones, twos, fours) = (self.one.blocks(), self.two.blocks(), self.four.blocks());
@@ -317,17 +341,22 @@ impl<const L: usize> Group<'_, L> {
     }
 }
 
-impl<I: Instructions, const L: usize> LaneSolver<I, L> {
-    fn group(&mut self, group: usize) -> Group<'_, L> {
-        Group {
-            one: GroupRows::new(&mut self.one, group),
-            two: GroupRows::new(&mut self.two, group),
-            four: GroupRows::new(&mut self.four, group),
-        }
+impl<I: Instructions, W: Lanes<L>, const L: usize> LaneSolver<I, W, L> {
+    /// The wide rows of a group.
+    fn group(&mut self, group: usize) -> Group<'_, W, L> {
+        let range = |groups: &[(u32, u32)]| (groups[group].0 as usize, groups[group].1 as usize);
+        let ranges = (range(&self.one.groups), range(&self.two.groups), range(&self.four.groups));
+        Group { one: self.one.share(ranges.0), two: self.two.share(ranges.1), four: self.four.share(ranges.2) }
+    }
+
+    /// All wide rows.
+    fn all(&mut self) -> Group<'_, W, L> {
+        let ends = (self.one.sources.len(), self.two.sources.len(), self.four.sources.len());
+        Group { one: self.one.share((0, ends.0)), two: self.two.share((0, ends.1)), four: self.four.share((0, ends.2)) }
     }
 }
 
-impl<I: Instructions, const L: usize> ContactSolver for LaneSolver<I, L> {
+impl<I: Instructions, W: Lanes<L>, const L: usize> ContactSolver for LaneSolver<I, W, L> {
     fn prepare(&mut self, plan: &RowPlan, context: &PrepareContext<'_>, pool: &mut StagePool) {
         const { assert!(CLASSES == 3) };
         self.serial.clear();
@@ -335,9 +364,19 @@ impl<I: Instructions, const L: usize> ContactSolver for LaneSolver<I, L> {
         self.one.lay_out(plan, 0);
         self.two.lay_out(plan, 1);
         self.four.lay_out(plan, 2);
-        self.one.prepare(plan, context, self.level, pool);
-        self.two.prepare(plan, context, self.level, pool);
-        self.four.prepare(plan, context, self.level, pool);
+        let (level, rows) = (self.level, &plan.rows[..]);
+        let all = self.all();
+        all.for_each_block(false, pool, |class, block| {
+            // SAFETY: each block is visited once.
+            unsafe {
+                match class {
+                    0 => level.run(PrepareKernel { block: all.one.block(block), rows, context }),
+                    1 => level.run(PrepareKernel { block: all.two.block(block), rows, context }),
+                    _ => level.run(PrepareKernel { block: all.four.block(block), rows, context }),
+                }
+            }
+        });
+        self.bounces = self.one.bounces() || self.two.bounces() || self.four.bounces();
     }
 
     fn pass(
@@ -348,31 +387,57 @@ impl<I: Instructions, const L: usize> ContactSolver for LaneSolver<I, L> {
         parameters: &PassParameters,
         pool: &mut StagePool,
     ) {
-        let states = SharedSlice::new(states);
-        let (common, serial) = ((self.level, parameters), self.serial[group]);
+        if pass == Pass::Restitution && !self.bounces {
+            return;
+        }
+        let states = &SharedSlice::new(states);
+        let (level, serial) = (self.level, self.serial[group]);
         let group = self.group(group);
-        group.for_each_block(serial, pool, |class, block| match class {
-            0 => group.one.run(block, pass, &states, common),
-            1 => group.two.run(block, pass, &states, common),
-            _ => group.four.run(block, pass, &states, common),
+        group.for_each_block(serial, pool, |class, block| {
+            // SAFETY: each block is visited once.
+            unsafe {
+                match class {
+                    0 => level.run(PassKernel { block: group.one.block(block), pass, states, parameters }),
+                    1 => level.run(PassKernel { block: group.two.block(block), pass, states, parameters }),
+                    _ => level.run(PassKernel { block: group.four.block(block), pass, states, parameters }),
+                }
+            }
+        });
+    }
+
+    fn integrate(
+        &self,
+        phase: Integration,
+        target: IntegrateTarget<'_>,
+        parameters: &IntegrateParameters,
+        pool: &mut StagePool,
+    ) {
+        let target = &target;
+        pool.run(target.blocks(), |block| {
+            self.level.run(IntegrateKernel::<W, L> { target, block, phase, parameters, lanes: PhantomData });
         });
     }
 
     fn store(&mut self, target: StoreTarget<'_>, pool: &mut StagePool) {
-        let shared = StoreShared {
+        let shared = &StoreShared {
             rows: &target.plan.rows,
             arbiters: SharedSlice::new(target.arbiters),
-            bodies: target.bodies,
+            states: SharedSlice::new(target.states),
             break_distance: target.break_distance,
             may_break: SharedSlice::new(target.may_break),
         };
         for index in 0..target.plan.groups.len() {
             let (level, serial) = (self.level, self.serial[index]);
             let group = self.group(index);
-            group.for_each_block(serial, pool, |class, block| match class {
-                0 => group.one.store(block, level, &shared),
-                1 => group.two.store(block, level, &shared),
-                _ => group.four.store(block, level, &shared),
+            group.for_each_block(serial, pool, |class, block| {
+                // SAFETY: each block is visited once.
+                unsafe {
+                    match class {
+                        0 => level.run(StoreKernel { block: group.one.block(block), target: shared }),
+                        1 => level.run(StoreKernel { block: group.two.block(block), target: shared }),
+                        _ => level.run(StoreKernel { block: group.four.block(block), target: shared }),
+                    }
+                }
             });
         }
     }

@@ -10,7 +10,7 @@ mod solve;
 
 pub(crate) use bodies::{BodyMass, BodyMotion, BodyState, SolverBodies};
 pub(crate) use coloring::RowPlan;
-pub(crate) use integrate::{IntegrateParameters, integrate_position, integrate_velocity};
+pub(crate) use integrate::{IntegrateParameters, IntegrateTarget, Integration};
 pub(crate) use lanes::{ContactSolver, Pass, StoreTarget, contact_solver};
 pub(crate) use prepare::PrepareContext;
 pub(crate) use solve::{PassParameters, Softness};

@@ -20,9 +20,9 @@
 //! points.
 
 use super::bodies::{SharedStates, WideDisplacement, WideVelocity, gather, scatter};
-use super::rows::{FrictionRow, NormalRow};
+use super::rows::{ExtraRow, FrictionRow, NormalRow, RowFeatures};
 use crate::math::Real;
-use crate::simd::{Wide, WideVec3};
+use crate::simd::{LaneVec3, Lanes, Number};
 
 /// Spring of a contact, as the solver uses it.
 #[derive(Clone, Copy, Debug)]
@@ -57,139 +57,298 @@ pub(crate) struct PassParameters {
     pub restitution_threshold: Real,
 }
 
-/// Applies the impulses of the last step.
-///
-/// # Safety
-/// No other thread may touch the dynamic bodies of the row.
-#[inline(always)]
-pub(crate) unsafe fn warm_start<const L: usize, const P: usize, const C: usize>(
-    row: &NormalRow<L, P, C>,
-    friction: &FrictionRow<L, P>,
-    states: &SharedStates<'_>,
-) {
-    // SAFETY: promised by the caller.
-    let (mut v1, _) = unsafe { gather(states, &row.body1) };
-    // SAFETY: promised by the caller.
-    let (mut v2, _) = unsafe { gather(states, &row.body2) };
-    let mut sum = Impulse::ZERO;
-    for i in 0..P {
-        sum.add_point(row, i, row.impulses[i]);
-    }
-    sum.apply(row, &mut v1, &mut v2);
-    apply_friction(row, friction, [friction.impulse1, friction.impulse2], &mut v1, &mut v2);
-    let twist = row.normal.scale(friction.twist_impulse);
-    apply_torque(row, &(twist + friction.rolling_impulse), &mut v1, &mut v2);
-    // SAFETY: promised by the caller.
-    unsafe { scatter(states, &row.body1, &v1) };
-    // SAFETY: promised by the caller.
-    unsafe { scatter(states, &row.body2, &v2) };
+/// A wide row as a pass sees it.
+pub(crate) struct RowPass<'a, W, const L: usize, const P: usize, const C: usize> {
+    pub row: &'a mut NormalRow<W, L, P, C>,
+    pub friction: &'a mut FrictionRow<W, P>,
+    pub extra: &'a mut ExtraRow<W, P>,
+    pub features: RowFeatures,
+    pub states: &'a SharedStates<'a>,
 }
 
-/// The biased pass.
-///
-/// # Safety
-/// No other thread may touch the dynamic bodies of the row.
-#[inline(always)]
-pub(crate) unsafe fn solve<const L: usize, const P: usize, const C: usize>(
-    row: &mut NormalRow<L, P, C>,
-    states: &SharedStates<'_>,
-    pass: &PassParameters,
-) {
-    // SAFETY: promised by the caller.
-    let (mut v1, d1) = unsafe { gather(states, &row.body1) };
-    // SAFETY: promised by the caller.
-    let (mut v2, d2) = unsafe { gather(states, &row.body2) };
-    let separations = separations(row, &d1, &d2);
-    solve_normals::<L, P, C, true>(row, &separations, &mut v1, &mut v2, pass);
-    // SAFETY: promised by the caller.
-    unsafe { scatter(states, &row.body1, &v1) };
-    // SAFETY: promised by the caller.
-    unsafe { scatter(states, &row.body2, &v2) };
+/// Both bodies of a wide row.
+struct Sides<W> {
+    v1: WideVelocity<W>,
+    d1: WideDisplacement<W>,
+    v2: WideVelocity<W>,
+    d2: WideDisplacement<W>,
 }
 
-/// The unbiased pass, with friction.
-///
-/// # Safety
-/// No other thread may touch the dynamic bodies of the row.
-#[inline(always)]
-pub(crate) unsafe fn relax<const L: usize, const P: usize, const C: usize>(
-    row: &mut NormalRow<L, P, C>,
-    friction: &mut FrictionRow<L, P>,
-    states: &SharedStates<'_>,
-    pass: &PassParameters,
-) {
-    // SAFETY: promised by the caller.
-    let (mut v1, d1) = unsafe { gather(states, &row.body1) };
-    // SAFETY: promised by the caller.
-    let (mut v2, d2) = unsafe { gather(states, &row.body2) };
-    let separations = separations(row, &d1, &d2);
-    solve_normals::<L, P, C, false>(row, &separations, &mut v1, &mut v2, pass);
-    let mut load = Wide::ZERO;
-    let mut twist_load = Wide::ZERO;
-    for i in 0..P {
-        friction.totals[i] += row.impulses[i];
-        load += row.impulses[i];
-        twist_load += row.impulses[i] * friction.levers[i];
-    }
-    if friction.has_rolling {
-        solve_rolling(row, friction, load, &mut v1, &mut v2);
-    }
-    solve_twist(row, friction, twist_load, &mut v1, &mut v2);
-    solve_tangents(row, friction, load, &mut v1, &mut v2);
-    // SAFETY: promised by the caller.
-    unsafe { scatter(states, &row.body1, &v1) };
-    // SAFETY: promised by the caller.
-    unsafe { scatter(states, &row.body2, &v2) };
-}
-
-/// Gives points that were hit their share of the approach speed back.
-///
-/// The points of a manifold share the bounce: what one gives, it gives to all through the coupling. One sweep over four
-/// points costs a box that lands flat 7 % of its height; eight leave less than a tenth of a percent.
-///
-/// # Safety
-/// No other thread may touch the dynamic bodies of the row.
-#[inline(always)]
-pub(crate) unsafe fn restitute<const L: usize, const P: usize, const C: usize>(
-    row: &mut NormalRow<L, P, C>,
-    friction: &mut FrictionRow<L, P>,
-    states: &SharedStates<'_>,
-    pass: &PassParameters,
-) {
-    if !friction.has_restitution {
-        return;
-    }
-    // SAFETY: promised by the caller.
-    let (mut v1, _) = unsafe { gather(states, &row.body1) };
-    // SAFETY: promised by the caller.
-    let (mut v2, _) = unsafe { gather(states, &row.body2) };
-    let mut velocities = normal_velocities(row, &v1, &v2);
-    let threshold = Wide::splat(-pass.restitution_threshold);
-    let own: [Wide<L>; P] = std::array::from_fn(|i| row.points[i].mass.inverse_or_zero());
-    let mut sum = Impulse::ZERO;
-    for _ in 0..if P > 1 { RESTITUTION_SWEEPS } else { 1 } {
+impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> RowPass<'_, W, L, P, C> {
+    /// Applies the impulses of the last step.
+    ///
+    /// # Safety
+    /// No other thread may touch the dynamic bodies of the row.
+    #[inline(always)]
+    pub unsafe fn warm_start(self) {
+        // SAFETY: promised by the caller.
+        let mut sides = unsafe { self.gather() };
+        let mut sum = Impulse::ZERO;
         for i in 0..P {
-            let target = friction.restitution * friction.approach[i];
+            sum.add_point(self.row, i, self.row.impulses[i]);
+        }
+        self.apply(&sum, &mut sides);
+        let tangents = Tangents::of(self.row, self.friction);
+        self.apply_friction(&tangents, [self.friction.impulse1, self.friction.impulse2], &mut sides);
+        let twist = self.row.normal.scale(self.friction.twist_impulse);
+        let torque = if self.features.rolling { twist + self.extra.rolling_impulse } else { twist };
+        self.apply_torque(&torque, &mut sides);
+        // SAFETY: promised by the caller.
+        unsafe { self.scatter(&sides) };
+    }
+
+    /// The biased pass.
+    ///
+    /// # Safety
+    /// No other thread may touch the dynamic bodies of the row.
+    #[inline(always)]
+    pub unsafe fn solve(mut self, pass: &PassParameters) {
+        // SAFETY: promised by the caller.
+        let mut sides = unsafe { self.gather() };
+        self.solve_normals::<true>(&mut sides, pass);
+        // SAFETY: promised by the caller.
+        unsafe { self.scatter(&sides) };
+    }
+
+    /// The unbiased pass, with friction.
+    ///
+    /// # Safety
+    /// No other thread may touch the dynamic bodies of the row.
+    #[inline(always)]
+    pub unsafe fn relax(mut self, pass: &PassParameters) {
+        // SAFETY: promised by the caller.
+        let mut sides = unsafe { self.gather() };
+        self.solve_normals::<false>(&mut sides, pass);
+        let mut load = W::ZERO;
+        let mut twist_load = W::ZERO;
+        for i in 0..P {
+            let impulse = self.row.impulses[i];
+            self.friction.totals[i] += impulse;
+            load += impulse;
+            twist_load += impulse * self.friction.levers[i];
+        }
+        if self.features.rolling {
+            self.solve_rolling(load, &mut sides);
+        }
+        self.solve_twist(twist_load, &mut sides);
+        self.solve_tangents(load, &mut sides);
+        // SAFETY: promised by the caller.
+        unsafe { self.scatter(&sides) };
+    }
+
+    /// Gives points that were hit their share of the approach speed back.
+    ///
+    /// The points of a manifold share the bounce: what one gives, it gives to all through the coupling. One sweep over four
+    /// points costs a box that lands flat 7 % of its height; eight leave less than a tenth of a percent.
+    ///
+    /// # Safety
+    /// No other thread may touch the dynamic bodies of the row.
+    #[inline(always)]
+    pub unsafe fn restitute(self, pass: &PassParameters) {
+        if !self.features.restitution {
+            return;
+        }
+        // SAFETY: promised by the caller.
+        let mut sides = unsafe { self.gather() };
+        let mut velocities = self.normal_velocities(&sides);
+        let (row, friction, extra) = (&mut *self.row, &mut *self.friction, &*self.extra);
+        let threshold = W::splat(-pass.restitution_threshold);
+        let mut own = [W::ZERO; P];
+        for (own, point) in own.iter_mut().zip(&row.points) {
+            *own = point.mass.inverse_or_zero();
+        }
+        let mut sum = Impulse::ZERO;
+        for _ in 0..if P > 1 { RESTITUTION_SWEEPS } else { 1 } {
+            for i in 0..P {
+                let target = extra.restitution * extra.approach[i];
+                let old = row.impulses[i];
+                let wanted = (old - row.points[i].mass * (velocities[i] + target)).max(W::ZERO);
+                // Bounces only what hit: closing fast enough, and pressed within this step.
+                let bounces = (threshold - extra.approach[i]).if_positive(friction.totals[i], W::ZERO);
+                let new = (bounces * extra.restitution).if_positive(wanted, old);
+                let delta = new - old;
+                row.impulses[i] = new;
+                friction.totals[i] += delta;
+                for (j, velocity) in velocities.iter_mut().enumerate() {
+                    let response = if i == j { own[i] } else { row.coupling[pair_of::<P>(i.min(j), i.max(j))] };
+                    *velocity += response * delta;
+                }
+                sum.add_point(row, i, delta);
+            }
+        }
+        self.apply(&sum, &mut sides);
+        // SAFETY: promised by the caller.
+        unsafe { self.scatter(&sides) };
+    }
+
+    /// # Safety
+    /// No other thread may touch the dynamic bodies of the row.
+    #[inline(always)]
+    unsafe fn gather(&self) -> Sides<W> {
+        // SAFETY: promised by the caller.
+        let (v1, d1) = unsafe { gather(self.states, &self.row.body1) };
+        // SAFETY: promised by the caller.
+        let (v2, d2) = unsafe { gather(self.states, &self.row.body2) };
+        Sides { v1, d1, v2, d2 }
+    }
+
+    /// # Safety
+    /// No other thread may touch the dynamic bodies of the row.
+    #[inline(always)]
+    unsafe fn scatter(&self, sides: &Sides<W>) {
+        // SAFETY: promised by the caller.
+        unsafe { scatter(self.states, &self.row.body1, (&sides.v1, &sides.d1)) };
+        // SAFETY: promised by the caller.
+        unsafe { scatter(self.states, &self.row.body2, (&sides.v2, &sides.d2)) };
+    }
+
+    /// Normal velocity at each point.
+    #[inline(always)]
+    fn normal_velocities(&self, sides: &Sides<W>) -> [W; P] {
+        let (row, w1, w2) = (&*self.row, &sides.v1.angular, &sides.v2.angular);
+        let common = row.normal.dot(&(sides.v2.linear - sides.v1.linear)) + row.offset.dot(w2);
+        let spin = *w2 - *w1;
+        let mut velocities = [common; P];
+        for (velocity, point) in velocities.iter_mut().zip(&row.points) {
+            *velocity = common + point.arm.dot(&spin);
+        }
+        velocities
+    }
+
+    /// Gap at each point now, to first order in the displacements of the step.
+    #[inline(always)]
+    fn separations(&self, sides: &Sides<W>) -> [W; P] {
+        let (row, t1, t2) = (&*self.row, &sides.d1.turn, &sides.d2.turn);
+        let common = row.normal.dot(&(sides.d2.translation - sides.d1.translation)) + row.offset.dot(t2);
+        let turned = *t2 - *t1;
+        let mut separations = [common; P];
+        for (separation, point) in separations.iter_mut().zip(&row.points) {
+            *separation = point.separation + common + point.arm.dot(&turned);
+        }
+        separations
+    }
+
+    /// One Gauss–Seidel sweep over the points of a row.
+    #[inline(always)]
+    fn solve_normals<const BIAS: bool>(&mut self, sides: &mut Sides<W>, pass: &PassParameters) {
+        let separations = self.separations(sides);
+        let mut velocities = self.normal_velocities(sides);
+        let row = &mut *self.row;
+        let inverse_substep = W::splat(pass.inverse_substep);
+        let rate = W::splat(pass.softness.mass_scale * pass.softness.bias_rate);
+        let (soft, one) = (W::splat(pass.softness.mass_scale), W::splat(1.0));
+        let leak = W::splat(pass.softness.impulse_scale);
+        let limit = W::splat(-pass.push_out_speed);
+        let firmest = rate * W::splat(pass.deepest_rest);
+        let mut sum = Impulse::ZERO;
+        let mut pair = 0;
+        for i in 0..P {
+            let s = separations[i];
             let old = row.impulses[i];
-            let wanted = (old - row.points[i].mass * (velocities[i] + target)).max(Wide::ZERO);
-            // Bounces only what hit: closing fast enough, and pressed within this step.
-            let bounces = (threshold - friction.approach[i]).if_positive(friction.totals[i], Wide::ZERO);
-            let new = (bounces * friction.restitution).if_positive(wanted, old);
+            let change = if BIAS {
+                let bias = s.if_positive(s * inverse_substep, (s * rate).max(limit));
+                let scale = s.if_positive(one, soft);
+                let leak = s.if_positive(W::ZERO, leak);
+                row.points[i].mass * (scale * velocities[i] + bias) + (leak * old).min(row.points[i].mass * firmest)
+            } else {
+                row.points[i].mass * (velocities[i] + s.max(W::ZERO) * inverse_substep)
+            };
+            let new = (old - change).max(W::ZERO);
             let delta = new - old;
             row.impulses[i] = new;
-            friction.totals[i] += delta;
-            for (j, velocity) in velocities.iter_mut().enumerate() {
-                let response = if i == j { own[i] } else { row.coupling[pair_of::<P>(i.min(j), i.max(j))] };
-                *velocity += response * delta;
+            for later in &mut velocities[i + 1..] {
+                *later += row.coupling[pair] * delta;
+                pair += 1;
             }
             sum.add_point(row, i, delta);
         }
+        self.apply(&sum, sides);
     }
-    sum.apply(row, &mut v1, &mut v2);
-    // SAFETY: promised by the caller.
-    unsafe { scatter(states, &row.body1, &v1) };
-    // SAFETY: promised by the caller.
-    unsafe { scatter(states, &row.body2, &v2) };
+
+    /// Rolling resistance: a torque against the relative spin, limited by the load.
+    #[inline(always)]
+    fn solve_rolling(&mut self, load: W, sides: &mut Sides<W>) {
+        let response = self.row.inverse_inertia1.add(&self.row.inverse_inertia2);
+        let old = self.extra.rolling_impulse;
+        let wanted = old - response.solve(&(sides.v2.angular - sides.v1.angular));
+        let new = wanted.scale(cone_scale(wanted.dot(&wanted), self.extra.rolling_resistance * load));
+        self.extra.rolling_impulse = new;
+        self.apply_torque(&(new - old), sides);
+    }
+
+    /// Friction against turning about the normal.
+    #[inline(always)]
+    fn solve_twist(&mut self, twist_load: W, sides: &mut Sides<W>) {
+        if P == 1 {
+            return; // one point has no lever
+        }
+        let limit = self.friction.friction * twist_load;
+        let old = self.friction.twist_impulse;
+        let spin = self.row.normal.dot(&(sides.v2.angular - sides.v1.angular));
+        let new = (old - self.friction.twist_mass * spin).min(limit).max(-limit);
+        self.friction.twist_impulse = new;
+        self.apply_torque(&self.row.normal.scale(new - old), sides);
+    }
+
+    /// Friction against sliding: both tangents at once, inside the circle of the cone.
+    #[inline(always)]
+    fn solve_tangents(&mut self, load: W, sides: &mut Sides<W>) {
+        let tangents = Tangents::of(self.row, self.friction);
+        let friction = &mut *self.friction;
+        let slide = sides.v2.linear - sides.v1.linear + sides.v2.angular.cross(&friction.lever2)
+            - sides.v1.angular.cross(&friction.lever1);
+        let (mut slip1, mut slip2) = (tangents.first.dot(&slide), tangents.second.dot(&slide));
+        if self.features.conveyor {
+            (slip1, slip2) = (slip1 - self.extra.target1, slip2 - self.extra.target2);
+        }
+        let (old1, old2) = (friction.impulse1, friction.impulse2);
+        let wanted1 = old1 - (friction.mass11 * slip1 + friction.mass12 * slip2);
+        let wanted2 = old2 - (friction.mass12 * slip1 + friction.mass22 * slip2);
+        let scale = cone_scale(wanted1 * wanted1 + wanted2 * wanted2, friction.friction * load);
+        friction.impulse1 = wanted1 * scale;
+        friction.impulse2 = wanted2 * scale;
+        let change = [friction.impulse1 - old1, friction.impulse2 - old2];
+        self.apply_friction(&tangents, change, sides);
+    }
+
+    /// Applies the impulses of all points.
+    #[inline(always)]
+    fn apply(&self, sum: &Impulse<W>, sides: &mut Sides<W>) {
+        self.apply_linear(&self.row.normal.scale(sum.along_normal), sides);
+        let angular2 = sum.angular.add_scaled(&self.row.offset, sum.along_normal);
+        sides.v1.angular = sides.v1.angular - self.row.inverse_inertia1.mul(&sum.angular);
+        sides.v2.angular = sides.v2.angular + self.row.inverse_inertia2.mul(&angular2);
+    }
+
+    /// Applies tangential impulses at the friction centre.
+    #[inline(always)]
+    fn apply_friction(&self, tangents: &Tangents<W>, [impulse1, impulse2]: [W; 2], sides: &mut Sides<W>) {
+        let impulse = tangents.first.scale(impulse1).add_scaled(&tangents.second, impulse2);
+        self.apply_linear(&impulse, sides);
+        let angular1 = self.friction.lever1.cross(&impulse);
+        let angular2 = self.friction.lever2.cross(&impulse);
+        sides.v1.angular = sides.v1.angular - self.row.inverse_inertia1.mul(&angular1);
+        sides.v2.angular = sides.v2.angular + self.row.inverse_inertia2.mul(&angular2);
+    }
+
+    /// Pushes body 2 by `impulse` and body 1 by its opposite.
+    #[inline(always)]
+    fn apply_linear(&self, impulse: &LaneVec3<W>, sides: &mut Sides<W>) {
+        let mut push1 = impulse.scale(self.row.inverse_mass1);
+        let mut push2 = impulse.scale(self.row.inverse_mass2);
+        if self.features.locks {
+            (push1, push2) = (push1.times(&self.extra.free1), push2.times(&self.extra.free2));
+        }
+        sides.v1.linear = sides.v1.linear - push1;
+        sides.v2.linear = sides.v2.linear + push2;
+    }
+
+    /// Turns body 2 by the angular impulse and body 1 by its opposite.
+    #[inline(always)]
+    fn apply_torque(&self, impulse: &LaneVec3<W>, sides: &mut Sides<W>) {
+        sides.v1.angular = sides.v1.angular - self.row.inverse_inertia1.mul(impulse);
+        sides.v2.angular = sides.v2.angular + self.row.inverse_inertia2.mul(impulse);
+    }
 }
 
 /// Sweeps of the bounce over the points of a manifold; once a step, and only where something bounces.
@@ -201,217 +360,47 @@ const fn pair_of<const P: usize>(i: usize, j: usize) -> usize {
     i * P - i * (i + 1) / 2 + j - i - 1
 }
 
-/// Gap at each point now, to first order in the displacements of the step.
-#[inline(always)]
-fn separations<const L: usize, const P: usize, const C: usize>(
-    row: &NormalRow<L, P, C>,
-    d1: &WideDisplacement<L>,
-    d2: &WideDisplacement<L>,
-) -> [Wide<L>; P] {
-    let approach = row.normal.dot(&(d2.translation - d1.translation));
-    std::array::from_fn(|i| {
-        let point = &row.points[i];
-        point.separation + approach + point.arm2.dot(&d2.turn) - point.arm1.dot(&d1.turn)
-    })
+/// The plane of friction.
+struct Tangents<W> {
+    first: LaneVec3<W>,
+    second: LaneVec3<W>,
 }
 
-/// Normal velocity at each point.
-#[inline(always)]
-fn normal_velocities<const L: usize, const P: usize, const C: usize>(
-    row: &NormalRow<L, P, C>,
-    v1: &WideVelocity<L>,
-    v2: &WideVelocity<L>,
-) -> [Wide<L>; P] {
-    let linear = row.normal.dot(&(v2.linear - v1.linear));
-    std::array::from_fn(|i| linear + row.points[i].arm2.dot(&v2.angular) - row.points[i].arm1.dot(&v1.angular))
-}
-
-/// One Gauss–Seidel sweep over the points of a row.
-#[inline(always)]
-fn solve_normals<const L: usize, const P: usize, const C: usize, const BIAS: bool>(
-    row: &mut NormalRow<L, P, C>,
-    separations: &[Wide<L>; P],
-    v1: &mut WideVelocity<L>,
-    v2: &mut WideVelocity<L>,
-    pass: &PassParameters,
-) {
-    let mut velocities = normal_velocities(row, v1, v2);
-    let inverse_substep = Wide::splat(pass.inverse_substep);
-    let rate = Wide::splat(pass.softness.mass_scale * pass.softness.bias_rate);
-    let (soft, one) = (Wide::splat(pass.softness.mass_scale), Wide::splat(1.0));
-    let leak = Wide::splat(pass.softness.impulse_scale);
-    let limit = Wide::splat(-pass.push_out_speed);
-    let firmest = rate * Wide::splat(pass.deepest_rest);
-    let mut sum = Impulse::ZERO;
-    let mut pair = 0;
-    for i in 0..P {
-        let s = separations[i];
-        let (bias, scale, leak) = if BIAS {
-            let push = (s * rate).max(limit);
-            (s.if_positive(s * inverse_substep, push), s.if_positive(one, soft), s.if_positive(Wide::ZERO, leak))
-        } else {
-            (s.max(Wide::ZERO) * inverse_substep, one, Wide::ZERO)
-        };
-        let old = row.impulses[i];
-        let change = if BIAS {
-            row.points[i].mass * (scale * velocities[i] + bias) + (leak * old).min(row.points[i].mass * firmest)
-        } else {
-            row.points[i].mass * (velocities[i] + bias)
-        };
-        let new = (old - change).max(Wide::ZERO);
-        let delta = new - old;
-        row.impulses[i] = new;
-        for later in &mut velocities[i + 1..] {
-            *later += row.coupling[pair] * delta;
-            pair += 1;
-        }
-        sum.add_point(row, i, delta);
+impl<W: Number> Tangents<W> {
+    #[inline(always)]
+    fn of<const L: usize, const P: usize, const C: usize>(
+        row: &NormalRow<W, L, P, C>,
+        friction: &FrictionRow<W, P>,
+    ) -> Self {
+        Self { first: friction.tangent1, second: row.normal.cross(&friction.tangent1) }
     }
-    sum.apply(row, v1, v2);
 }
 
 /// Impulses of several points gathered up, to be applied at once.
-struct Impulse<const L: usize> {
-    along_normal: Wide<L>,
-    angular1: WideVec3<L>,
-    angular2: WideVec3<L>,
+struct Impulse<W> {
+    along_normal: W,
+    /// About the centre of body 1.
+    angular: LaneVec3<W>,
 }
 
-impl<const L: usize> Impulse<L> {
-    const ZERO: Self = Self { along_normal: Wide::ZERO, angular1: WideVec3::ZERO, angular2: WideVec3::ZERO };
+impl<W: Number> Impulse<W> {
+    const ZERO: Self = Self { along_normal: W::ZERO, angular: LaneVec3::ZERO };
 
     #[inline(always)]
-    fn add_point<const P: usize, const C: usize>(&mut self, row: &NormalRow<L, P, C>, point: usize, impulse: Wide<L>) {
-        self.along_normal += impulse;
-        self.angular1 = self.angular1.add_scaled(&row.points[point].arm1, impulse);
-        self.angular2 = self.angular2.add_scaled(&row.points[point].arm2, impulse);
-    }
-
-    #[inline(always)]
-    fn apply<const P: usize, const C: usize>(
-        &self,
-        row: &NormalRow<L, P, C>,
-        v1: &mut WideVelocity<L>,
-        v2: &mut WideVelocity<L>,
+    fn add_point<const L: usize, const P: usize, const C: usize>(
+        &mut self,
+        row: &NormalRow<W, L, P, C>,
+        point: usize,
+        impulse: W,
     ) {
-        let linear = row.normal.scale(self.along_normal);
-        apply_linear(row, &linear, v1, v2);
-        v1.angular = v1.angular - row.inverse_inertia1.mul(&self.angular1);
-        v2.angular = v2.angular + row.inverse_inertia2.mul(&self.angular2);
+        self.along_normal += impulse;
+        self.angular = self.angular.add_scaled(&row.points[point].arm, impulse);
     }
-}
-
-/// Pushes body 2 by `impulse` and body 1 by its opposite.
-#[inline(always)]
-fn apply_linear<const L: usize, const P: usize, const C: usize>(
-    row: &NormalRow<L, P, C>,
-    impulse: &WideVec3<L>,
-    v1: &mut WideVelocity<L>,
-    v2: &mut WideVelocity<L>,
-) {
-    v1.linear.x -= row.inverse_mass1.x * impulse.x;
-    v1.linear.y -= row.inverse_mass1.y * impulse.y;
-    v1.linear.z -= row.inverse_mass1.z * impulse.z;
-    v2.linear.x += row.inverse_mass2.x * impulse.x;
-    v2.linear.y += row.inverse_mass2.y * impulse.y;
-    v2.linear.z += row.inverse_mass2.z * impulse.z;
-}
-
-/// Turns body 2 by the angular impulse and body 1 by its opposite.
-#[inline(always)]
-fn apply_torque<const L: usize, const P: usize, const C: usize>(
-    row: &NormalRow<L, P, C>,
-    impulse: &WideVec3<L>,
-    v1: &mut WideVelocity<L>,
-    v2: &mut WideVelocity<L>,
-) {
-    v1.angular = v1.angular - row.inverse_inertia1.mul(impulse);
-    v2.angular = v2.angular + row.inverse_inertia2.mul(impulse);
-}
-
-/// Applies tangential impulses at the friction centre.
-#[inline(always)]
-fn apply_friction<const L: usize, const P: usize, const C: usize>(
-    row: &NormalRow<L, P, C>,
-    friction: &FrictionRow<L, P>,
-    [impulse1, impulse2]: [Wide<L>; 2],
-    v1: &mut WideVelocity<L>,
-    v2: &mut WideVelocity<L>,
-) {
-    let linear = friction.tangent1.scale(impulse1).add_scaled(&friction.tangent2, impulse2);
-    apply_linear(row, &linear, v1, v2);
-    let angular1 = friction.arm11.scale(impulse1).add_scaled(&friction.arm12, impulse2);
-    let angular2 = friction.arm21.scale(impulse1).add_scaled(&friction.arm22, impulse2);
-    v1.angular = v1.angular - row.inverse_inertia1.mul(&angular1);
-    v2.angular = v2.angular + row.inverse_inertia2.mul(&angular2);
 }
 
 /// Scales a length down to a limit: `limit / length` where it is longer, else 1.
 #[inline(always)]
-fn cone_scale<const L: usize>(squared_length: Wide<L>, limit: Wide<L>) -> Wide<L> {
+fn cone_scale<W: Number>(squared_length: W, limit: W) -> W {
     let excess = squared_length - limit * limit;
-    excess.if_positive(limit / squared_length.sqrt(), Wide::splat(1.0))
-}
-
-/// Rolling resistance: a torque against the relative spin, limited by the load.
-#[inline(always)]
-fn solve_rolling<const L: usize, const P: usize, const C: usize>(
-    row: &NormalRow<L, P, C>,
-    friction: &mut FrictionRow<L, P>,
-    load: Wide<L>,
-    v1: &mut WideVelocity<L>,
-    v2: &mut WideVelocity<L>,
-) {
-    let response = row.inverse_inertia1.add(&row.inverse_inertia2);
-    let old = friction.rolling_impulse;
-    let wanted = old - response.solve(&(v2.angular - v1.angular));
-    let new = wanted.scale(cone_scale(wanted.dot(&wanted), friction.rolling_resistance * load));
-    friction.rolling_impulse = new;
-    apply_torque(row, &(new - old), v1, v2);
-}
-
-/// Friction against turning about the normal.
-#[inline(always)]
-fn solve_twist<const L: usize, const P: usize, const C: usize>(
-    row: &NormalRow<L, P, C>,
-    friction: &mut FrictionRow<L, P>,
-    twist_load: Wide<L>,
-    v1: &mut WideVelocity<L>,
-    v2: &mut WideVelocity<L>,
-) {
-    if P == 1 {
-        return; // one point has no lever
-    }
-    let limit = friction.friction * twist_load;
-    let old = friction.twist_impulse;
-    let spin = row.normal.dot(&(v2.angular - v1.angular));
-    let new = (old - friction.twist_mass * spin).min(limit).max(-limit);
-    friction.twist_impulse = new;
-    apply_torque(row, &row.normal.scale(new - old), v1, v2);
-}
-
-/// Friction against sliding: both tangents at once, inside the circle of the cone.
-#[inline(always)]
-fn solve_tangents<const L: usize, const P: usize, const C: usize>(
-    row: &NormalRow<L, P, C>,
-    friction: &mut FrictionRow<L, P>,
-    load: Wide<L>,
-    v1: &mut WideVelocity<L>,
-    v2: &mut WideVelocity<L>,
-) {
-    let linear = v2.linear - v1.linear;
-    let slip1 = friction.tangent1.dot(&linear) + friction.arm21.dot(&v2.angular)
-        - friction.arm11.dot(&v1.angular)
-        - friction.target1;
-    let slip2 = friction.tangent2.dot(&linear) + friction.arm22.dot(&v2.angular)
-        - friction.arm12.dot(&v1.angular)
-        - friction.target2;
-    let (old1, old2) = (friction.impulse1, friction.impulse2);
-    let wanted1 = old1 - (friction.mass11 * slip1 + friction.mass12 * slip2);
-    let wanted2 = old2 - (friction.mass12 * slip1 + friction.mass22 * slip2);
-    let scale = cone_scale(wanted1 * wanted1 + wanted2 * wanted2, friction.friction * load);
-    friction.impulse1 = wanted1 * scale;
-    friction.impulse2 = wanted2 * scale;
-    let change = [friction.impulse1 - old1, friction.impulse2 - old2];
-    apply_friction(row, friction, change, v1, v2);
+    excess.if_positive(limit / squared_length.sqrt(), W::splat(1.0))
 }

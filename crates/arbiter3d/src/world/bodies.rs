@@ -640,11 +640,10 @@ impl World {
         let dynamic = body.is_dynamic() && body.enabled && !body.frozen;
         let (free_linear, free_angular) = body.locked_axes.free();
         let motion = &mut self.solver_bodies.motions[index as usize];
-        motion.kinematic = body.kind != BodyKind::Dynamic;
-        motion.free_rotation = free_angular;
+        motion.kinematic = flag(body.kind != BodyKind::Dynamic);
         motion.inertia = body.mass.inertia;
         motion.inverse_inertia = body.mass.inertia.inverse().unwrap_or_default();
-        motion.gyroscopic = dynamic && !body.mass.inertia.is_isotropic() && free_angular == Vec3::ONE;
+        motion.gyroscopic = flag(dynamic && !body.mass.inertia.is_isotropic() && free_angular == Vec3::ONE);
         let state = &mut self.solver_bodies.states[index as usize];
         if body.kind == BodyKind::Static {
             (state.linear_velocity, state.angular_velocity) = (Vec3::ZERO, Vec3::ZERO);
@@ -653,8 +652,11 @@ impl World {
         mass.inverse_mass = if dynamic { free_linear / body.mass.mass } else { Vec3::ZERO };
         mass.rotation = body.pose.rotation;
         mass.center = body.pose.transform_point(body.mass.center);
-        mass.inverse_inertia =
-            if dynamic { world_inverse_inertia(&mass.rotation.to_mat3(), motion) } else { SymmetricMat3::ZERO };
+        mass.inverse_inertia = if dynamic {
+            world_inverse_inertia(&mass.rotation.to_mat3(), motion, free_angular)
+        } else {
+            SymmetricMat3::ZERO
+        };
         let moves = dynamic && (free_linear != Vec3::ZERO || free_angular != Vec3::ZERO);
         self.solver_bodies.states[index as usize].moves = u32::from(moves);
     }
@@ -668,10 +670,14 @@ impl World {
     }
 }
 
-/// Inverse inertia in world axes; with locked axes, the inverse of the block that may turn.
+/// Yes or no as the integrator's lanes have it.
+fn flag(yes: bool) -> Real {
+    if yes { 1.0 } else { 0.0 }
+}
+
+/// Inverse inertia in world axes; with locked axes (0 in `free`), the inverse of the block that may turn.
 #[inline(always)]
-pub(crate) fn world_inverse_inertia(rotation: &Mat3, motion: &BodyMotion) -> SymmetricMat3 {
-    let free = motion.free_rotation;
+pub(crate) fn world_inverse_inertia(rotation: &Mat3, motion: &BodyMotion, free: Vec3) -> SymmetricMat3 {
     if free == Vec3::ONE {
         return motion.inverse_inertia.rotate(rotation);
     }

@@ -9,8 +9,7 @@ use crate::id::BodyId;
 use crate::math::{Aabb, Real, Vec3, min};
 use crate::parallel::{BlockList, Gather, SharedSlice};
 use crate::solver::{
-    IntegrateParameters, Pass, PassParameters, PrepareContext, Softness, StoreTarget, integrate_position,
-    integrate_velocity,
+    IntegrateParameters, IntegrateTarget, Integration, Pass, PassParameters, PrepareContext, Softness, StoreTarget,
 };
 
 /// Overlap of the most heavily loaded contact at rest, in slops. A light body under a heavy pile would sink deeper into its
@@ -152,13 +151,13 @@ impl World {
         let motion = &mut self.solver_bodies.motions[index as usize];
         let mass = &self.solver_bodies.masses[index as usize];
         let (free, _) = body.locked_axes.free();
-        let dynamic = !motion.kinematic && !body.frozen;
+        let dynamic = motion.kinematic == 0.0 && !body.frozen;
         let gravity = self.settings.gravity * body.gravity_scale * free;
         motion.acceleration = if dynamic { gravity + mass.inverse_mass * body.force } else { Vec3::ZERO };
         motion.angular_acceleration = if dynamic { mass.inverse_inertia.mul(body.torque) } else { Vec3::ZERO };
         (body.force, body.torque) = (Vec3::ZERO, Vec3::ZERO);
         let state = &mut self.solver_bodies.states[index as usize];
-        (state.translation, state.turn, state.constrained) = (Vec3::ZERO, Vec3::ZERO, 0);
+        (state.translation, state.turn, state.constrained) = (Vec3::ZERO, Vec3::ZERO, 0.0);
     }
 
     /// Finds the pairs of shapes that have moved.
@@ -223,12 +222,13 @@ impl World {
             max_angular_speed: 1.5 / substep,
         };
         for index in 0..settings.substeps {
-            self.integrate_velocities(&integrate, index == 0);
-            if index == 0 {
+            let first = index == 0;
+            self.integrate(if first { Integration::FirstVelocities } else { Integration::Velocities }, &integrate);
+            if first {
                 self.run_pass(Pass::WarmStart, &soft, &stiff);
             }
             self.run_pass(Pass::Solve, &soft, &stiff);
-            self.integrate_positions(&integrate);
+            self.integrate(Integration::Positions, &integrate);
             self.run_pass(Pass::Relax, &soft, &stiff);
         }
         self.run_pass(Pass::Restitution, &soft, &stiff);
@@ -241,33 +241,9 @@ impl World {
         }
     }
 
-    fn integrate_velocities(&mut self, parameters: &IntegrateParameters, first: bool) {
-        let awake = &self.scratch.sorted_awake;
-        let states = SharedSlice::new(&mut self.solver_bodies.states);
-        let motions = SharedSlice::new(&mut self.solver_bodies.motions);
-        self.pool.run(awake.len().div_ceil(BODIES_PER_BLOCK), |block| {
-            for &body in block_of(awake, block) {
-                // SAFETY: a body stands in the list once.
-                let (state, motion) = unsafe { (states.get_mut(body as usize), motions.get_mut(body as usize)) };
-                integrate_velocity(state, motion, parameters, first);
-            }
-        });
-    }
-
-    fn integrate_positions(&mut self, parameters: &IntegrateParameters) {
-        let awake = &self.scratch.sorted_awake;
-        let states = SharedSlice::new(&mut self.solver_bodies.states);
-        let motions = SharedSlice::new(&mut self.solver_bodies.motions);
-        let masses = SharedSlice::new(&mut self.solver_bodies.masses);
-        self.pool.run(awake.len().div_ceil(BODIES_PER_BLOCK), |block| {
-            for &body in block_of(awake, block) {
-                let index = body as usize;
-                // SAFETY: a body stands in the list once.
-                let (state, motion, mass) =
-                    unsafe { (states.get_mut(index), motions.get_mut(index), masses.get_mut(index)) };
-                integrate_position(state, motion, mass, parameters);
-            }
-        });
+    fn integrate(&mut self, phase: Integration, parameters: &IntegrateParameters) {
+        let target = IntegrateTarget::new(&self.scratch.sorted_awake, &mut self.solver_bodies);
+        self.solver.integrate(phase, target, parameters, &mut self.pool);
     }
 
     /// Impulses back to the arbiters. Whose contacts may have broken is noted.
@@ -278,7 +254,7 @@ impl World {
         let target = StoreTarget {
             plan: &self.plan,
             arbiters: self.arbiters.slots_mut(),
-            bodies: &self.solver_bodies,
+            states: &mut self.solver_bodies.states,
             break_distance: self.scaled.contact_break_distance,
             may_break: &mut may_break,
         };
@@ -341,7 +317,7 @@ impl World {
     fn freeze(&mut self, index: u32) {
         let state = &mut self.solver_bodies.states[index as usize];
         (state.linear_velocity, state.angular_velocity) = (Vec3::ZERO, Vec3::ZERO);
-        self.solver_bodies.motions[index as usize].broken = false;
+        self.solver_bodies.motions[index as usize].broken = 0.0;
         self.bodies[index as usize].frozen = true;
         self.refresh_solver_body(index);
         self.clear_contacts_of(index);
@@ -418,22 +394,24 @@ impl FinalizeContext<'_> {
             && mass.rotation.is_finite()
             && state.linear_velocity.is_finite()
             && state.angular_velocity.is_finite();
-        if motion.broken || !finite {
+        if motion.broken > 0.0 || !finite {
             news.push(BodyNews::Broken(index));
             return;
         }
         mass.center = center;
         let rotation = mass.rotation.to_mat3();
         if body.is_dynamic() && !body.frozen {
-            mass.inverse_inertia = world_inverse_inertia(&rotation, motion);
+            mass.inverse_inertia = world_inverse_inertia(&rotation, motion, body.locked_axes.free().1);
         }
         body.pose.rotation = mass.rotation;
         body.pose.position = center - rotation * body.mass.center;
         let speed = state.linear_velocity.length() + state.angular_velocity.length() * body.reach;
-        let rests = if motion.kinematic { speed == 0.0 } else { body.can_sleep && speed < self.settings.sleep_speed };
+        let rests =
+            if motion.kinematic > 0.0 { speed == 0.0 } else { body.can_sleep && speed < self.settings.sleep_speed };
         body.sleep_time = if rests { body.sleep_time + self.dt } else { 0.0 };
         let traveled = state.translation.length() + state.turn.length() * (body.reach - body.inner_radius);
-        if self.settings.continuous && body.continuous && !motion.kinematic && traveled > 0.5 * body.inner_radius {
+        if self.settings.continuous && body.continuous && motion.kinematic == 0.0 && traveled > 0.5 * body.inner_radius
+        {
             news.push(BodyNews::Fast(index));
         }
         let displacement = state.linear_velocity * self.dt;

@@ -6,7 +6,7 @@
 use super::lanes::{CuboidLanes, Pick};
 use super::{EDGE_GAIN, FACE_BIAS, PARALLEL};
 use crate::math::Real;
-use crate::simd::{Wide, WideVec3};
+use crate::simd::{Number, Wide, WideVec3};
 
 /// `c[j]`: axis `j` of box 2 in the frame of box 1.
 pub(super) type Columns<const L: usize> = [WideVec3<L>; 3];
@@ -68,8 +68,8 @@ impl<const L: usize> CuboidLanes<L> {
         let floor = face_gap + self.size * Wide::splat(EDGE_GAIN);
         let (edge, edge_gap) = self.best_edge(&columns, floor);
         let one = Wide::splat(1.0);
-        let by_edge = edge.if_positive(edge_gap.if_greater(self.margin, one, Wide::ZERO), Wide::ZERO);
-        let apart = face_gap.if_greater(self.margin, one, by_edge);
+        let by_edge = edge.if_positive(edge_gap.if_above(self.margin, one, Wide::ZERO), Wide::ZERO);
+        let apart = face_gap.if_above(self.margin, one, by_edge);
         Axes { face, face_gap, edge, edge_gap, apart }
     }
 
@@ -88,10 +88,10 @@ impl<const L: usize> CuboidLanes<L> {
         let axis2 = axis2 + Wide::splat(3.0);
         // Box 2 has to be better by the bias, but where the boxes are apart.
         let biased = best1 + self.size * Wide::splat(FACE_BIAS);
-        let (second, second_gap) = (best2.if_greater(biased, axis2, axis1), best2.if_greater(biased, best2, best1));
-        let second = best2.if_greater(self.margin, axis2, second);
-        let second_gap = best2.if_greater(self.margin, best2, second_gap);
-        (best1.if_greater(self.margin, axis1, second), best1.if_greater(self.margin, best1, second_gap))
+        let (second, second_gap) = (best2.if_above(biased, axis2, axis1), best2.if_above(biased, best2, best1));
+        let second = best2.if_above(self.margin, axis2, second);
+        let second_gap = best2.if_above(self.margin, best2, second_gap);
+        (best1.if_above(self.margin, axis1, second), best1.if_above(self.margin, best1, second_gap))
     }
 
     /// The edge pair with the largest gap, if that is above `floor`.
@@ -109,9 +109,9 @@ impl<const L: usize> CuboidLanes<L> {
                 let gap = (t[i2] * c[j][i1] - t[i1] * c[j][i2]).abs() - (reach1 + reach2);
                 let squared = c[j][i1] * c[j][i1] + c[j][i2] * c[j][i2];
                 // Parallel edges are left to the faces: no gap at all.
-                let gap = squared.if_greater(Wide::splat(PARALLEL), gap / squared.sqrt(), floor);
-                axis = gap.if_greater(best, Wide::splat((6 + 3 * i + j) as f32), axis);
-                best = gap.if_greater(best, gap, best);
+                let gap = squared.if_above(Wide::splat(PARALLEL), gap / squared.sqrt(), floor);
+                axis = gap.if_above(best, Wide::splat((6 + 3 * i + j) as f32), axis);
+                best = gap.if_above(best, gap, best);
             }
         }
         (axis, best)
@@ -122,8 +122,8 @@ impl<const L: usize> CuboidLanes<L> {
 #[inline(always)]
 fn largest<const L: usize>(values: &[Wide<L>; 3]) -> (Wide<L>, Wide<L>) {
     let [x, y, z] = *values;
-    let (axis, best) = (y.if_greater(x, Wide::splat(1.0), Wide::ZERO), y.if_greater(x, y, x));
-    (z.if_greater(best, Wide::splat(2.0), axis), z.if_greater(best, z, best))
+    let (axis, best) = (y.if_above(x, Wide::splat(1.0), Wide::ZERO), y.if_above(x, y, x));
+    (z.if_above(best, Wide::splat(2.0), axis), z.if_above(best, z, best))
 }
 
 /// In each lane one of the three columns.

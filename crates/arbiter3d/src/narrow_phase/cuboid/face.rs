@@ -8,7 +8,7 @@ use super::axes::{Columns, pick_column};
 use super::lanes::{CuboidLanes, Pick, WideManifold};
 use super::{GROWTH, SIGNS};
 use crate::math::Real;
-use crate::simd::{Wide, WideVec3};
+use crate::simd::{Number, Wide, WideVec3};
 
 /// Candidates for corners of a clipped face: the two ends of each of four sides, and the four corners of the rectangle.
 const CANDIDATES: usize = 12;
@@ -51,7 +51,7 @@ impl<const L: usize> CuboidLanes<L> {
     #[inline(always)]
     pub(super) fn face_contacts(&self, axis: &Wide<L>, count: usize) -> WideManifold<L> {
         let c = self.pose.rotation.axes();
-        let swap = axis.if_greater(Wide::splat(2.5), Wide::splat(1.0), Wide::ZERO);
+        let swap = axis.if_above(Wide::splat(2.5), Wide::splat(1.0), Wide::ZERO);
         let k = Pick(swap.if_positive(*axis - Wide::splat(3.0), *axis));
         let pairs = FacePairs::new(self, &c, swap, k);
         let patches = pairs.clip(self.margin);
@@ -91,14 +91,14 @@ impl<const L: usize> FacePairs<L> {
         let axes = turned.each_ref().map(around);
         let (half1, position) = (around(&half1), around(&position));
         let one = Wide::splat(1.0);
-        let sign = Wide::ZERO.if_greater(position[2], -one, one);
+        let sign = Wide::ZERO.if_above(position[2], -one, one);
         // A face must look along the normal clearly more to take over: a box at 45° keeps its incident face.
         let steep = axes.each_ref().map(|axis| axis[2].abs());
         let clearly = Wide::splat(1e-3);
         let floor = steep[0] + clearly;
-        let j = steep[1].if_greater(floor, one, Wide::ZERO);
-        let floor = steep[1].if_greater(floor, steep[1] + clearly, floor);
-        let j = steep[2].if_greater(floor, Wide::splat(2.0), j);
+        let j = steep[1].if_above(floor, one, Wide::ZERO);
+        let floor = steep[1].if_above(floor, steep[1] + clearly, floor);
+        let j = steep[2].if_above(floor, Wide::splat(2.0), j);
         let pick = Pick(j);
         let side = |s: usize| -> [Wide<L>; 3] {
             std::array::from_fn(|x| pick.of([axes[s % 3][x], axes[(s + 1) % 3][x], axes[(s + 2) % 3][x]]))
@@ -152,7 +152,7 @@ impl<const L: usize> FacePairs<L> {
         let (m, p, q, r) = (&self.center, &self.p, &self.q, &self.rectangle);
         let (zero, one, two) = (Wide::<L>::ZERO, Wide::<L>::splat(1.0), Wide::<L>::splat(2.0));
         // A side along the border may not divide by zero: a tiny slope keeps it inside or throws it far out.
-        let steep = |way: Wide<L>| way.if_zero(Wide::splat(1e-30), way);
+        let steep = |way: Wide<L>| way.abs().if_positive(way, Wide::splat(1e-30));
         let inverse: [[Wide<L>; 2]; 2] = std::array::from_fn(|x| [p[x], q[x]].map(|side| one / steep(side * two)));
         for (e, (a, b)) in SIGNS.into_iter().enumerate() {
             let corner: [Wide<L>; 3] = std::array::from_fn(|x| m[x] + Wide::splat(a) * p[x] + Wide::splat(b) * q[x]);
@@ -167,9 +167,9 @@ impl<const L: usize> FacePairs<L> {
                 leave = high.max(low).min(leave);
             }
             let at = |t: Wide<L>| [corner[0] + way[0] * t, corner[1] + way[1] * t, corner[2] + way[2] * t];
-            let crosses = enter.if_greater(leave, zero, one);
+            let crosses = enter.if_above(leave, zero, one);
             patches.set(2 * e, at(enter), crosses, margin);
-            let ends = leave.if_greater(enter, one.if_greater(leave, one, zero), zero);
+            let ends = leave.if_above(enter, one.if_above(leave, one, zero), zero);
             patches.set(2 * e + 1, at(leave), ends, margin);
             let [first, second, _] = NAMES[e];
             patches.names[2 * e] = std::array::from_fn(|lane| first | u32::from(enter[lane] > 0.0));
@@ -189,7 +189,7 @@ impl<const L: usize> FacePairs<L> {
             let (x, y) = (at[0] - m[0], at[1] - m[1]);
             let (s, t) = (x * q[1] - y * q[0], p[0] * y - p[1] * x);
             let height = m[2] + (s * s_slope + t * t_slope);
-            let over = size.if_greater(s.abs(), size.if_greater(t.abs(), one, zero), zero);
+            let over = size.if_above(s.abs(), size.if_above(t.abs(), one, zero), zero);
             patches.set(8 + e, [at[0], at[1], height], over, margin);
             patches.names[8 + e] = [NAMES[e][2]; L];
         }

@@ -4,7 +4,7 @@ use super::super::polyhedron::cuboid_size;
 use super::super::{Manifold, ManifoldPoint};
 use crate::math::{Pose, Real, Vec3, min};
 use crate::shape::Cuboid;
-use crate::simd::{Wide, WidePose, WideVec3};
+use crate::simd::{Number, Wide, WidePose, WideVec3};
 
 /// `L` pairs of cuboids, each told in the frame of its first.
 pub(crate) struct CuboidLanes<const L: usize> {
@@ -44,7 +44,7 @@ pub(super) struct Pick<const L: usize>(pub Wide<L>);
 impl<const L: usize> Pick<L> {
     #[inline(always)]
     pub fn of(&self, [x, y, z]: [Wide<L>; 3]) -> Wide<L> {
-        self.0.if_greater(Wide::splat(1.5), z, self.0.if_greater(Wide::splat(0.5), y, x))
+        self.0.if_above(Wide::splat(1.5), z, self.0.if_above(Wide::splat(0.5), y, x))
     }
 }
 

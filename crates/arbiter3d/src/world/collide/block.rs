@@ -14,7 +14,7 @@ use crate::math::{Pose, Real, max, min};
 use crate::narrow_phase::{CuboidAxes, CuboidLanes, Manifold, NearCuboids, collide};
 use crate::parallel::{BlockList, SharedSlice};
 use crate::shape::Shape;
-use crate::simd::{Kernel, Wide, WidePose, WideRotation, prefetch, prefetch_line};
+use crate::simd::{Kernel, Number, Wide, WidePose, WideRotation, prefetch};
 
 /// Words of the active set in a block.
 pub(super) const WORDS_PER_BLOCK: usize = 2;
@@ -193,11 +193,11 @@ impl<const L: usize> BlockKernel<'_, L> {
         let (context, arbiters) = (self.context, self.pairs.arbiters);
         let pair = self.pairs.pair(index);
         for side in 0..2 {
-            prefetch_line(&raw const context.shapes[pair.shapes[side] as usize]);
-            prefetch_line(&raw const context.solver.states[pair.bodies[side] as usize]);
+            prefetch(&context.shapes[pair.shapes[side] as usize].geometry);
+            prefetch(&context.solver.states[pair.bodies[side] as usize]);
         }
         if pair.arbiter != NONE {
-            prefetch(arbiters.place(pair.arbiter as usize));
+            arbiters.prefetch(pair.arbiter as usize);
         }
     }
 
@@ -344,9 +344,9 @@ impl CollideContext<'_> {
     #[inline(always)]
     fn prefetch_bodies(&self, pair: &Pair) {
         for body in pair.bodies {
-            prefetch_line(&raw const self.solver.masses[body as usize]);
+            prefetch(&self.solver.masses[body as usize]);
             if pair.arbiter == NONE {
-                prefetch_line(&raw const self.solver.states[body as usize]);
+                prefetch(&self.solver.states[body as usize]);
             }
         }
     }
