@@ -28,6 +28,7 @@ mod triangle;
 mod triangle_lanes;
 mod triangle_solid;
 
+pub(crate) use cuboid::{Axes as CuboidAxes, CuboidLanes, Near as NearCuboids, WideManifold};
 pub(crate) use distance::Support;
 pub(crate) use time_of_impact::{Sweep, gap, time_of_impact};
 
@@ -115,7 +116,7 @@ fn collide_sorted(
     (cache, manifold): (&mut PairCache, &mut Manifold),
 ) {
     match (shape1, shape2) {
-        (Shape::Cuboid(a), Shape::Cuboid(b)) => cuboid::cuboid_cuboid(a, b, pose, margin, cache, manifold),
+        (Shape::Cuboid(a), Shape::Cuboid(b)) => cuboid::cuboid_cuboid(a, b, pose, margin, manifold),
         (Shape::Sphere(a), Shape::Sphere(b)) => sphere::sphere_sphere(a, b, pose, margin, manifold),
         (Shape::Capsule(a), Shape::Sphere(b)) => sphere::capsule_sphere(a, b, pose, margin, manifold),
         (Shape::Cuboid(a), Shape::Sphere(b)) => sphere::cuboid_sphere(a, b, pose, margin, manifold),

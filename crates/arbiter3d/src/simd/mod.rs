@@ -5,11 +5,13 @@
 //!
 //! [`Instructions::run`] enters a kernel under the instructions of a level. Fused multiply-add is never enabled.
 
+mod pose;
 mod vector;
 mod wide;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
+pub(crate) use pose::{WidePose, WideRotation, WideVec3};
 pub(crate) use vector::{LaneRotation, LaneSymmetric, LaneVec3};
 pub(crate) use wide::{Lanes, Number, Quad, Wide};
 #[cfg(target_arch = "x86_64")]

@@ -22,6 +22,12 @@ impl<W: Number> LaneVec3<W> {
         Self { x: W::splat(v.x), y: W::splat(v.y), z: W::splat(v.z) }
     }
 
+    /// The three coordinates.
+    #[inline(always)]
+    pub fn columns(&self) -> [W; 3] {
+        [self.x, self.y, self.z]
+    }
+
     #[inline(always)]
     pub fn dot(&self, o: &Self) -> W {
         self.x * o.x + self.y * o.y + self.z * o.z
@@ -69,7 +75,7 @@ impl<W: Number> LaneVec3<W> {
 impl<const L: usize> LaneVec3<Wide<L>> {
     /// The same numbers in lanes of another kind.
     #[inline(always)]
-    pub fn to_lanes<W: Lanes<L>>(&self) -> LaneVec3<W> {
+    pub fn to_lanes<W: Lanes<L>>(self) -> LaneVec3<W> {
         LaneVec3 { x: W::from_array(self.x.0), y: W::from_array(self.y.0), z: W::from_array(self.z.0) }
     }
 }

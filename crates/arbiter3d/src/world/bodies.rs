@@ -608,6 +608,9 @@ impl World {
             // Anchors are kept from the centre of mass.
             self.clear_contacts_of(index);
         }
+        for &slot in &self.bodies[index as usize].shape_slots {
+            self.shapes[slot as usize].set_center(mass.center);
+        }
         self.refresh_reach(index);
         self.refresh_solver_body(index);
     }

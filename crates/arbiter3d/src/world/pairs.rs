@@ -13,8 +13,12 @@ use crate::narrow_phase::PairCache;
 
 /// What the world keeps of a pair. Shape 1 has the smaller id.
 #[derive(Clone, Debug)]
+#[repr(C, align(64))] // what tells whether the manifold still holds fills the first cache line
 pub(crate) struct Pair {
-    pub shapes: [u32; 2],
+    /// Centre frame of body 2 seen from that of body 1 when the manifold was made.
+    pub manifold_pose: Pose,
+    /// How body 1 was turned when the manifold's normal and levers were put into world axes.
+    pub manifold_rotation: Rotation,
     pub bodies: [u32; 2],
     /// `NONE` while the shapes do not touch.
     pub arbiter: u32,
@@ -28,12 +32,9 @@ pub(crate) struct Pair {
     pub overlapping: bool,
     /// Whether `manifold_pose` holds: cleared by teleports and edits.
     pub has_manifold: bool,
-    /// Centre frame of body 2 seen from that of body 1 when the manifold was made.
-    pub manifold_pose: Pose,
-    /// How body 1 was turned when the manifold's normal and levers were put into world axes.
-    pub manifold_rotation: Rotation,
-    /// How far the pair may move (metres) before its manifold is made anew.
-    reuse_distance: Real,
+    pub shapes: [u32; 2],
+    /// Inner radius of the smaller shape, metres.
+    pub size: Real,
     /// How far a pair without contact may turn (sine of half the angle) until its shapes are looked at again.
     apart_rotation: Real,
     pub cache: PairCache,
@@ -44,39 +45,29 @@ pub(crate) struct Pair {
 /// How far a pair may move, in shares of the smaller shape's inner radius, before its manifold is made anew.
 const REUSE_TRANSLATION: Real = 0.02;
 /// How far a pair may turn (sine of half the angle) before its manifold is made anew: 1.4°.
-const REUSE_ROTATION: Real = 0.0125;
+pub(super) const REUSE_ROTATION: Real = 0.0125;
 
 impl Pair {
-    /// Whether the pair is so nearly where its manifold was made that the manifold may stay.
+    /// How far (metres, sine of half the angle) the bodies may move against each other before their shapes are looked at
+    /// again.
     ///
-    /// Relative to the size of the smaller shape, so that small bodies are treated as large ones are.
+    /// Where they touch, relative to the size of the smaller shape, so that small bodies are treated as large ones are.
+    /// Where they were more than a speculative distance apart, half of that is left for moving and turning, half for
+    /// closing: see [`Pair::closes_slowly`].
     #[inline(always)]
-    pub fn hardly_moved(&self, between: &Pose) -> bool {
-        let old = &self.manifold_pose;
-        let moved = between.position - old.position;
-        let turned = old.rotation.conjugate().mul(between.rotation).vector();
-        moved.length_squared() < self.reuse_distance * self.reuse_distance
-            && turned.length_squared() < REUSE_ROTATION * REUSE_ROTATION
+    pub fn reuse_limits(&self, speculative_distance: Real) -> (Real, Real) {
+        if self.arbiter == NONE {
+            (0.25 * speculative_distance, self.apart_rotation)
+        } else {
+            (REUSE_TRANSLATION * self.size, REUSE_ROTATION)
+        }
     }
 
-    /// Whether a pair whose shapes were more than a speculative distance apart, and now close by `closing` in a step, is still
-    /// too far apart to touch within it: half the distance is left for moving and turning, half for closing.
+    /// Whether shapes that were more than a speculative distance apart, and now close by `closing` in a step, are still too
+    /// far apart to touch within it.
     #[inline(always)]
-    pub fn still_apart(&self, between: &Pose, closing: Real, speculative_distance: Real) -> bool {
-        let old = &self.manifold_pose;
-        let moved = between.position - old.position;
-        let turned = old.rotation.conjugate().mul(between.rotation).vector();
-        let limit = 0.25 * speculative_distance;
-        closing < 2.0 * limit
-            && moved.length_squared() < limit * limit
-            && turned.length_squared() < self.apart_rotation * self.apart_rotation
-    }
-
-    /// Whether body 1 has turned so little that normal and levers may stay as they are.
-    #[inline(always)]
-    pub fn hardly_turned(&self, rotation1: Rotation) -> bool {
-        let turned = self.manifold_rotation.conjugate().mul(rotation1).vector();
-        turned.length_squared() < REUSE_ROTATION * REUSE_ROTATION
+    pub fn closes_slowly(closing: Real, speculative_distance: Real) -> bool {
+        closing < 2.0 * (0.25 * speculative_distance)
     }
 
     pub fn has_shape(&self, slot: u32) -> bool {
@@ -84,53 +75,41 @@ impl Pair {
     }
 }
 
-/// A set of places, listed in order when asked for: one bit a place.
+/// A set of places as bits, so that they can be visited in the order in which they lie in memory.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PlaceSet {
-    bits: Vec<u64>,
-    list: Vec<u32>,
-    /// Whether the list is out of date.
-    changed: bool,
+    words: Vec<u64>,
+    count: usize,
 }
 
 impl PlaceSet {
+    /// Adds a place, which may be there already.
     pub fn insert(&mut self, place: u32) {
-        let word = place as usize / 64;
-        if self.bits.len() <= word {
-            self.bits.resize(word + 1, 0);
+        let (word, bit) = (place as usize / 64, 1 << (place % 64));
+        if self.words.len() <= word {
+            self.words.resize(word + 1, 0);
         }
-        self.bits[word] |= 1 << (place % 64);
-        self.changed = true;
+        self.count += usize::from(self.words[word] & bit == 0);
+        self.words[word] |= bit;
     }
 
+    /// Removes a place, which may be missing.
     pub fn remove(&mut self, place: u32) {
-        self.bits[place as usize / 64] &= !(1 << (place % 64));
-        self.changed = true;
-    }
-
-    /// Brings the list up to date.
-    pub fn refresh(&mut self) {
-        if !std::mem::take(&mut self.changed) {
-            return;
-        }
-        self.list.clear();
-        for (word, &bits) in self.bits.iter().enumerate() {
-            let mut rest = bits;
-            while rest != 0 {
-                self.list.push(word as u32 * 64 + rest.trailing_zeros());
-                rest &= rest - 1;
-            }
+        let bit = 1 << (place % 64);
+        if let Some(word) = self.words.get_mut(place as usize / 64) {
+            self.count -= usize::from(*word & bit != 0);
+            *word &= !bit;
         }
     }
 
-    /// Whether the list is up to date and empty.
-    pub fn is_empty(&self) -> bool {
-        !self.changed && self.list.is_empty()
+    /// How many places are in the set.
+    pub fn len(&self) -> usize {
+        self.count
     }
 
-    /// The places as of the last [`PlaceSet::refresh`], smallest first.
-    pub fn list(&self) -> &[u32] {
-        &self.list
+    /// Bit `i % 64` of word `i / 64` is place `i`.
+    pub fn words(&self) -> &[u64] {
+        &self.words
     }
 }
 
@@ -182,7 +161,7 @@ impl World {
             has_manifold: false,
             manifold_pose: Pose::IDENTITY,
             manifold_rotation: Rotation::IDENTITY,
-            reuse_distance: self.reuse_distance(shapes),
+            size: self.smaller_radius(shapes),
             apart_rotation: self.scaled.speculative_distance / (8.0 * max(reach(0), reach(1))),
             cache: PairCache::default(),
             next: [NONE; 2],
@@ -203,13 +182,11 @@ impl World {
         }
     }
 
-    fn reuse_distance(&self, shapes: [u32; 2]) -> Real {
-        let radii = shapes.map(|slot| self.shapes[slot as usize].geometry.inner_radius());
-        let smaller = match radii {
+    fn smaller_radius(&self, shapes: [u32; 2]) -> Real {
+        match shapes.map(|slot| self.shapes[slot as usize].geometry.inner_radius()) {
             [a, b] if a > 0.0 && b > 0.0 => min(a, b),
             [a, b] => max(a, b), // a mesh has no inside
-        };
-        REUSE_TRANSLATION * smaller
+        }
     }
 
     /// Ends a pair: its arbiter ends for `reason`, a sensor's overlap ends too.

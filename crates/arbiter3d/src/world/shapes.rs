@@ -11,18 +11,31 @@ use crate::shape::Shape;
 
 /// What the world keeps of a shape.
 #[derive(Clone, Debug)]
+#[repr(C, align(64))] // what the narrow phase reads fills the first cache line
 pub(crate) struct ShapeSlot {
+    pub geometry: Shape,
     pub id: ShapeId,
     /// Body slot; `NONE` for a free place.
     pub body: u32,
+    /// Where the shape's frame sits seen from the body's centre of mass.
+    pub from_center: Pose,
+    /// Whether that is right at it, with the body's axes.
+    pub centered: bool,
+    pub sensor: bool,
     /// Where the shape's frame sits on the body.
     pub pose: Pose,
-    pub geometry: Shape,
     pub density: Real,
     pub material: Material,
     pub filter: Filter,
-    pub sensor: bool,
     pub user_data: u128,
+}
+
+impl ShapeSlot {
+    /// Notes where the centre of mass of the body is.
+    pub fn set_center(&mut self, center: Vec3) {
+        self.from_center = Pose::new(self.pose.position - center, self.pose.rotation);
+        self.centered = self.from_center == Pose::IDENTITY;
+    }
 }
 
 /// A shape, to read.
@@ -218,6 +231,8 @@ impl World {
             id,
             body: index,
             pose: Pose::new(definition.position, rotation),
+            from_center: Pose::IDENTITY, // `update_mass` tells
+            centered: false,
             geometry: definition.shape.clone(),
             density: definition.density,
             material: definition.material,

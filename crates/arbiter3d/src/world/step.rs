@@ -108,7 +108,7 @@ impl World {
             return Ok(report);
         }
         let mut clock = PhaseClock::start();
-        let work = self.awake.len() + self.active_pairs.list().len() + self.arbiters.order().len();
+        let work = self.awake.len() + self.active_pairs.len() + self.arbiters.order().len();
         self.pool.begin_step(work >= WORK_FOR_THREADS);
         self.events.begin_step();
         self.flush_events();
@@ -151,7 +151,7 @@ impl World {
     fn is_at_rest(&self) -> bool {
         self.awake.is_empty()
             && !self.awake_changed
-            && self.active_pairs.is_empty()
+            && self.active_pairs.len() == 0
             && self.arbiters.are_asleep()
             && !self.broad_phase.has_moved()
             && self.scratch.moved.is_empty()

@@ -1,0 +1,252 @@
+//! From a manifold to the contacts of an arbiter.
+//!
+//! All is reckoned from the bodies' centres of mass, never from the world's origin: with the centre frames at `c₁, q₁` and
+//! `c₂, q₂`, a point `p₁` seen from the centre of body 1 and its gap `s` along the world normal `n` give
+//!
+//! ```text
+//! arm₁ = q₁ p₁,  arm₂ = arm₁ + s n − (c₂ − c₁),  anchor₁ = p₁,  anchor₂ = q₂⁻¹ arm₂
+//! ```
+
+use super::super::pairs::Pair;
+use super::super::shapes::ShapeSlot;
+use crate::arbiter::{Contact, ContactData, ONE_NORMAL, SLOTS, SolveMode};
+use crate::math::{Pose, Real, Rotation, Vec3};
+use crate::narrow_phase::{Manifold, ManifoldPoint, WideManifold};
+use crate::simd::{WidePose, WideRotation, WideVec3};
+use crate::solver::SolverBodies;
+
+/// Where a contact is: what a new manifold changes of it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    pub anchor1: Vec3,
+    pub anchor2: Vec3,
+    pub arm1: Vec3,
+    pub arm2: Vec3,
+    pub normal: Vec3,
+    pub local_normal: Vec3,
+    pub separation: Real,
+    pub feature: u32,
+}
+
+impl Place {
+    const NOWHERE: Self = Self {
+        anchor1: Vec3::ZERO,
+        anchor2: Vec3::ZERO,
+        arm1: Vec3::ZERO,
+        arm2: Vec3::ZERO,
+        normal: Vec3::ZERO,
+        local_normal: Vec3::ZERO,
+        separation: 0.0,
+        feature: 0,
+    };
+}
+
+/// Up to four places.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Places {
+    pub points: [Place; SLOTS],
+    pub count: usize,
+}
+
+impl Places {
+    pub const NONE: Self = Self { points: [Place::NOWHERE; SLOTS], count: 0 };
+
+    /// Those of a manifold in the frame of shape 1.
+    pub fn of_manifold(manifold: &Manifold, frame: &PairFrame) -> Self {
+        let mut places = Self::NONE;
+        for (place, point) in places.points.iter_mut().zip(manifold.points()) {
+            *place = frame.place(point);
+        }
+        places.count = manifold.points().len();
+        places
+    }
+}
+
+/// How a manifold in the frame of shape 1 becomes places on the two bodies.
+pub(super) struct PairFrame {
+    /// Shape 1 seen from the centre of body 1.
+    pub shape: Pose,
+    pub rotation1: Rotation,
+    pub rotation2: Rotation,
+    /// From centre to centre, world axes.
+    pub apart: Vec3,
+}
+
+impl PairFrame {
+    #[inline(always)]
+    pub fn new(pair: &Pair, shapes: &[ShapeSlot], bodies: &SolverBodies) -> Self {
+        let [m1, m2] = pair.bodies.map(|body| &bodies.masses[body as usize]);
+        Self {
+            shape: shapes[pair.shapes[0] as usize].from_center,
+            rotation1: m1.rotation,
+            rotation2: m2.rotation,
+            apart: m2.center - m1.center,
+        }
+    }
+
+    fn place(&self, point: &ManifoldPoint) -> Place {
+        let anchor1 = self.shape.transform_point(point.point1);
+        let local_normal = self.shape.rotation.rotate(point.normal);
+        let (arm1, normal) = (self.rotation1.rotate(anchor1), self.rotation1.rotate(local_normal));
+        let arm2 = arm1 + normal * point.separation - self.apart;
+        Place {
+            anchor1,
+            anchor2: self.rotation2.inverse_rotate(arm2),
+            arm1,
+            arm2,
+            normal,
+            local_normal,
+            separation: point.separation,
+            feature: point.feature,
+        }
+    }
+}
+
+/// [`PairFrame`], `L` side by side.
+pub(super) struct WideFrame<const L: usize> {
+    shape: WidePose<L>,
+    rotation1: WideRotation<L>,
+    rotation2: WideRotation<L>,
+    apart: WideVec3<L>,
+}
+
+impl<const L: usize> WideFrame<L> {
+    pub const EMPTY: Self = Self {
+        shape: WidePose::ZERO,
+        rotation1: WideRotation::ZERO,
+        rotation2: WideRotation::ZERO,
+        apart: WideVec3::ZERO,
+    };
+
+    #[inline(always)]
+    pub fn set(&mut self, lane: usize, pair: &Pair, shapes: &[ShapeSlot], bodies: &SolverBodies) {
+        let frame = PairFrame::new(pair, shapes, bodies);
+        self.shape.set(lane, &frame.shape);
+        self.rotation1.set(lane, frame.rotation1);
+        self.rotation2.set(lane, frame.rotation2);
+        self.apart.set(lane, frame.apart);
+    }
+
+    /// What [`PairFrame::place`] does to each point of each lane.
+    #[inline(always)]
+    pub fn places(&self, manifold: &WideManifold<L>) -> WidePlaces<L> {
+        let local_normal = self.shape.rotation.rotate(&manifold.normal);
+        let normal = self.rotation1.rotate(&local_normal);
+        let mut places = WidePlaces { points: [[WideVec3::ZERO; 4]; SLOTS], local_normal, normal };
+        for (i, place) in places.points.iter_mut().enumerate() {
+            let anchor1 = self.shape.rotation.rotate(&manifold.point1[i]) + self.shape.position;
+            let arm1 = self.rotation1.rotate(&anchor1);
+            let arm2 = arm1 + normal.scale(manifold.separation[i]) - self.apart;
+            *place = [anchor1, self.rotation2.inverse_rotate(&arm2), arm1, arm2];
+        }
+        places
+    }
+}
+
+/// [`Places`] of `L` pairs.
+pub(super) struct WidePlaces<const L: usize> {
+    /// Anchors, then arms.
+    points: [[WideVec3<L>; 4]; SLOTS],
+    local_normal: WideVec3<L>,
+    normal: WideVec3<L>,
+}
+
+impl<const L: usize> WidePlaces<L> {
+    #[inline(always)]
+    pub fn get(&self, lane: usize, manifold: &WideManifold<L>) -> Places {
+        let mut places = Places::NONE;
+        places.count = manifold.count[lane] as usize;
+        let (normal, local_normal) = (self.normal.get(lane), self.local_normal.get(lane));
+        for (i, place) in places.points.iter_mut().enumerate().take(places.count) {
+            let [anchor1, anchor2, arm1, arm2] = self.points[i].each_ref().map(|wide| wide.get(lane));
+            let (separation, feature) = (manifold.separation[i][lane], manifold.feature[i][lane]);
+            *place = Place { anchor1, anchor2, arm1, arm2, normal, local_normal, separation, feature };
+        }
+        places
+    }
+}
+
+/// Turns normals and levers to where the bodies have turned.
+pub(super) fn turn_levers(data: &mut ContactData, rotation1: Rotation, rotation2: Rotation) {
+    for contact in &mut data.slots {
+        contact.arm1 = rotation1.rotate(contact.local_anchor1);
+        contact.arm2 = rotation2.rotate(contact.local_anchor2);
+        if !contact.world_normal {
+            contact.normal = rotation1.rotate(contact.local_normal);
+        }
+    }
+}
+
+/// Replaces the contacts of an arbiter by those of a new manifold; points that were there before keep their slot and
+/// impulses.
+///
+/// A point is the same when its features are; else when an old one not yet taken is within the break distance.
+pub(super) fn update_contacts(data: &mut ContactData, places: &Places, break_distance: Real) {
+    let points = &places.points[..places.count.min(SLOTS)];
+    let mut matches = match_slots(data, points, break_distance);
+    let mut used: u8 = matches.iter().filter(|&&slot| slot < SLOTS).fold(0, |mask, &slot| mask | 1 << slot);
+    let mut one_normal = true;
+    for (i, place) in points.iter().enumerate() {
+        let kept = matches[i] < SLOTS;
+        if !kept {
+            matches[i] = (!used).trailing_zeros() as usize & (SLOTS - 1);
+            used |= 1 << matches[i];
+        }
+        let contact = &mut data.slots[matches[i]];
+        set_place(contact, place);
+        if kept {
+            contact.tangent_impulse -= place.normal * place.normal.dot(contact.tangent_impulse);
+        } else {
+            contact.reset_impulses();
+        }
+        one_normal &= place.local_normal == points[0].local_normal;
+    }
+    data.usage_mask = data.usage_mask & 0xf0 | used;
+    data.flags = data.flags & !ONE_NORMAL | if one_normal { ONE_NORMAL } else { 0 };
+}
+
+/// The slot of the contact that each point goes on from, or [`SLOTS`].
+fn match_slots(data: &ContactData, points: &[Place], break_distance: Real) -> [usize; SLOTS] {
+    let old = &data.slots;
+    let mut unclaimed = (data.usage_mask & 15) | data.usage_mask >> 4;
+    let mut matches = [SLOTS; SLOTS];
+    let mut missing = false;
+    for (found, point) in matches.iter_mut().zip(points) {
+        for slot in (0..SLOTS).rev() {
+            if unclaimed >> slot & 1 == 1 && old[slot].feature == point.feature {
+                *found = slot;
+            }
+        }
+        unclaimed &= !(1_u32 << *found) as u8;
+        missing |= *found == SLOTS;
+    }
+    if !missing || unclaimed == 0 {
+        return matches;
+    }
+    for (found, point) in matches.iter_mut().zip(points).filter(|(found, _)| **found == SLOTS) {
+        let near = |slot: usize| (old[slot].local_anchor1 - point.anchor1).length_squared();
+        let mut best = break_distance * break_distance;
+        for slot in (0..SLOTS).filter(|&slot| unclaimed >> slot & 1 == 1) {
+            if near(slot) < best {
+                best = near(slot);
+                *found = slot;
+            }
+        }
+        unclaimed &= !(1_u32 << *found) as u8;
+    }
+    matches
+}
+
+#[inline(always)]
+fn set_place(contact: &mut Contact, place: &Place) {
+    contact.local_anchor1 = place.anchor1;
+    contact.local_anchor2 = place.anchor2;
+    contact.arm1 = place.arm1;
+    contact.arm2 = place.arm2;
+    contact.normal = place.normal;
+    contact.local_normal = place.local_normal;
+    contact.separation = place.separation;
+    contact.feature = place.feature;
+    contact.remove = SolveMode::NONE;
+    contact.world_normal = false;
+}
