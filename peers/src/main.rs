@@ -72,30 +72,28 @@ fn time_scene(entry: &catalog::Entry, args: &Args, plan: &Plan, bar: &ProgressBa
             return Vec::new();
         }
     };
-    let engines = plan.engines.iter().filter(|&&kind| {
-        let reason = engine::unsupported(kind, &scene);
-        if let Some(reason) = &reason {
+    let mut rows: Vec<Row> = Vec::new();
+    for &kind in &plan.engines {
+        if let Some(reason) = engine::unsupported(kind, &scene) {
             bar.suspend(|| eprintln!("{}: left out for {}: {reason}", entry.name, kind.name()));
             bar.inc((plan.threads.len() * args.reps()) as u64);
+        } else {
+            rows.extend(plan.threads.iter().map(|&threads| Row::new(entry.name, kind, threads, &scene)));
         }
-        reason.is_none()
-    });
-    let pairs = plan.threads.iter().flat_map(|&threads| engines.clone().map(move |&kind| (kind, threads)));
-    let mut rows: Vec<Row> = pairs.map(|(kind, threads)| Row::new(entry.name, kind, threads, &scene)).collect();
-    for repetition in 0..args.reps() {
-        for row in &mut rows {
-            // What was stopped by the clock once would be so again.
-            if !row.timed_out {
-                let title = format!("{} {} {} thr", row.scene, row.engine.name(), row.threads);
-                let note = |step: usize| {
-                    if step.is_multiple_of(10) {
-                        bar.set_message(format!("{title} step {step}"));
-                    }
-                };
-                let run = run::run(row.engine, &scene, row.threads, args.max_seconds, &note);
-                row.add(run, entry.outcome, &scene, repetition + 1 == args.reps());
-            }
-            bar.inc(1);
+    }
+    rows.sort_by_key(|row| row.threads);
+    while rows.iter().any(|row| !row.is_done) {
+        for row in rows.iter_mut().filter(|row| !row.is_done) {
+            let title = format!("{} {} {} thr", row.scene, row.engine.name(), row.threads);
+            let note = |step: usize| {
+                if step.is_multiple_of(10) {
+                    bar.set_message(format!("{title} step {step}"));
+                }
+            };
+            let run = run::run(row.engine, &scene, row.threads, args.max_seconds, &note);
+            row.add(run, entry.outcome, &scene, args.reps());
+            // Runs beyond those that were asked for are not on the bar.
+            bar.inc(u64::from(row.means.len() <= args.reps()));
         }
     }
     rows

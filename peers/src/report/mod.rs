@@ -41,7 +41,14 @@ pub struct Row {
     pub failure: Option<String>,
     /// Whether the run was stopped by the clock.
     pub timed_out: bool,
+    /// Whether no more runs are wanted.
+    pub is_done: bool,
 }
+
+/// Milliseconds of stepping below which a run is cheap.
+const CHEAP: f64 = 100.0;
+/// How often cheap runs are repeated at least.
+const CHEAP_REPS: usize = 5;
 
 impl Row {
     /// A row to which no run has been added.
@@ -60,11 +67,13 @@ impl Row {
             bytes: [None; 2],
             failure: None,
             timed_out: false,
+            is_done: false,
         }
     }
 
-    /// Adds a run. The last one, and one that has failed, is measured.
-    pub fn add(&mut self, run: Run, outcome: Outcome, scene: &Scene, is_last: bool) {
+    /// Adds a run. After `reps` of them, or one that was stopped, the row is done and its last run is measured. Runs of less
+    /// than [`CHEAP`] are repeated at least [`CHEAP_REPS`] times: one interruption by another program would outweigh them.
+    pub fn add(&mut self, run: Run, outcome: Outcome, scene: &Scene, reps: usize) {
         if !run.steps.is_empty() {
             self.means.push(run.mean());
             let worst = run.worst_tenth();
@@ -76,14 +85,17 @@ impl Row {
                 self.best_steps.iter_mut().zip(&run.steps).for_each(|(best, step)| *best = best.min(*step));
             }
         }
-        if !(is_last || run.stopped.is_some()) {
+        let is_cheap = run.steps.iter().sum::<f64>() < CHEAP;
+        let wanted = if is_cheap { reps.max(CHEAP_REPS) } else { reps };
+        self.is_done = run.stopped.is_some() || self.means.len() >= wanted;
+        if !self.is_done {
             return;
         }
         (self.contacts, self.bytes, self.timed_out) = (run.contacts, [run.bytes, run.peak_bytes], run.timed_out);
         match measure(scene, &run.states) {
             Ok(quality) => {
                 self.quality = quality;
-                self.failure = self.failure.take().or_else(|| judge(outcome, scene, &run, &quality));
+                self.failure = judge(outcome, scene, &run, &quality);
             }
             Err(error) => self.failure = Some(format!("cannot be measured: {error}")),
         }
@@ -175,6 +187,7 @@ pub mod samples {
             bytes: [Some(1000), Some(2000)],
             failure: None,
             timed_out: false,
+            is_done: false,
         }
     }
 
@@ -228,8 +241,9 @@ mod tests {
         let scene = Scene::read(built, 4).unwrap();
         let mut row = Row::new("large_pyramid", Kind::Box3d, 1, &scene);
         for steps in [[1.0, 9.0, 2.0], [5.0, 3.0, 1.0]] {
-            row.add(Run { steps: steps.to_vec(), ..Run::default() }, Outcome::Moves, &scene, false);
+            row.add(Run { steps: steps.to_vec(), ..Run::default() }, Outcome::Moves, &scene, 2);
         }
+        assert!(!row.is_done, "such cheap runs are repeated more often");
         assert_eq!(row.best_steps, [1.0, 3.0, 1.0]);
         assert_eq!((row.fastest(), row.median()), (3.0, 3.5));
     }
