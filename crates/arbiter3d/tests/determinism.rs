@@ -21,11 +21,11 @@ use common::*;
 /// The hashes of the scenes, in their order.
 const GOLDEN: [(&str, u64); 6] = [
     ("pile", 0x5bff_8379_3093_f1fa),
-    ("hulls", 0x8a3d_bf07_2840_2baa),
-    ("mesh rain", 0xe6c0_c981_6520_cd51),
-    ("bullets", 0x9ef6_a7b4_6255_4deb),
-    ("custom contacts", 0x3970_6e77_18cc_fc72),
-    ("coming and going", 0x43a0_f3df_80e8_88d7),
+    ("hulls", 0xadbd_5a4c_0a1d_2d4c),
+    ("mesh rain", 0xaf2a_d6fe_5c76_1eba),
+    ("bullets", 0x2efe_fbbc_7452_3cc3),
+    ("custom contacts", 0x2d77_02c7_26ae_d7e5),
+    ("coming and going", 0xa0da_33af_0c47_d207),
 ];
 
 /// A scene: how it begins, and what is done before each step.
