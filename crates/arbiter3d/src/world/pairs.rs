@@ -47,6 +47,9 @@ const REUSE_TRANSLATION: Real = 0.02;
 /// How far a pair may turn (sine of half the angle) before its manifold is made anew: 1.4°.
 pub(super) const REUSE_ROTATION: Real = 0.0125;
 
+/// The same for long bodies, in shares of the smaller shape's inner radius over the body's reach.
+const REUSE_REACH: Real = 0.08;
+
 impl Pair {
     /// How far (metres, sine of half the angle) the bodies may move against each other before their shapes are looked at
     /// again.
@@ -59,7 +62,10 @@ impl Pair {
         if self.arbiter == NONE {
             (0.25 * speculative_distance, self.apart_rotation)
         } else {
-            (REUSE_TRANSLATION * self.size, REUSE_ROTATION)
+            // A small part far out on a long body moves farther than its own size by turning: `1 / reach` is known from
+            // `apart_rotation`.
+            let by_reach = REUSE_REACH * self.size * (8.0 * self.apart_rotation / speculative_distance);
+            (REUSE_TRANSLATION * self.size, min(REUSE_ROTATION, by_reach))
         }
     }
 
@@ -273,9 +279,9 @@ mod tests {
     use super::PlaceSet;
     use std::collections::BTreeSet;
 
-    /// 2,000 random edits over 300 places: the list is that of a sorted set, however often a place comes and goes.
+    /// 2,000 random edits over 300 places: bits and count are those of a sorted set, however often a place comes and goes.
     #[test]
-    fn places_are_listed_in_order_whatever_came_and_went() {
+    fn places_are_those_of_a_set_whatever_came_and_went() {
         let (mut set, mut model) = (PlaceSet::default(), BTreeSet::new());
         let mut state = 3_u64;
         for edit in 0..2_000 {
@@ -288,8 +294,9 @@ mod tests {
                 set.insert(place);
             }
             if edit % 7 == 0 {
-                set.refresh();
-                assert_eq!(set.list(), model.iter().copied().collect::<Vec<_>>());
+                let bit = |place: &u32| set.words().get(*place as usize / 64).is_some_and(|w| w >> (place % 64) & 1 == 1);
+                assert!((0..300).filter(bit).eq(model.iter().copied()));
+                assert_eq!(set.len(), model.len());
             }
         }
     }
