@@ -36,6 +36,7 @@ mod query;
 mod shape;
 mod simd;
 mod solver;
+mod storage;
 mod world;
 
 pub use arbiter::{Arbiter, ArbiterId, ArbiterKey, Contact, ContactData, ContactPoint, EndReason, SolveMode};

@@ -30,7 +30,8 @@ pub(crate) struct PrepareContext<'a> {
 pub(crate) struct RowTarget<'a, W, const L: usize, const P: usize, const C: usize> {
     pub row: &'a mut NormalRow<W, L, P, C>,
     pub friction: &'a mut FrictionRow<W, P>,
-    pub extra: &'a mut ExtraRow<W, P>,
+    /// There if the arbiters or bodies ask for it: [`RowSource::extra`].
+    pub extra: Option<&'a mut ExtraRow<W, P>>,
     pub features: &'a mut RowFeatures,
 }
 
@@ -83,9 +84,9 @@ pub(crate) fn prepare_row<W: Lanes<L>, const L: usize, const P: usize, const C: 
     sources: &[RowSource],
     context: &PrepareContext<'_>,
 ) {
-    let RowTarget { row, friction, extra, features } = target;
+    let RowTarget { row, friction, mut extra, features } = target;
     *features = features_of(sources, context);
-    let mut gathered = gather_bodies((row, extra, features), sources, context);
+    let mut gathered = gather_bodies((row, extra.as_deref_mut(), features), sources, context);
     let (frame1, frame2) = (gathered.1, gathered.2);
     gather_points(row, &mut gathered.0, (&frame1, &frame2), (sources, context));
     let gathered = gathered.0;
@@ -96,7 +97,7 @@ pub(crate) fn prepare_row<W: Lanes<L>, const L: usize, const P: usize, const C: 
         coefficients[lane] = context.arbiters[source.arbiter as usize].data.friction;
     }
     friction.friction = W::from_array(coefficients);
-    if features.any() {
+    if let Some(extra) = extra.filter(|_| features.any()) {
         prepare_extra(row, friction, (extra, *features), sources, context);
     }
 }
@@ -117,7 +118,7 @@ fn features_of(sources: &[RowSource], context: &PrepareContext<'_>) -> RowFeatur
 /// Masses of both bodies, with the parts removed that the contact leaves alone.
 #[inline(always)]
 fn gather_bodies<W: Lanes<L>, const L: usize, const P: usize, const C: usize>(
-    (row, extra, features): (&mut NormalRow<W, L, P, C>, &mut ExtraRow<W, P>, &mut RowFeatures),
+    (row, extra, features): (&mut NormalRow<W, L, P, C>, Option<&mut ExtraRow<W, P>>, &mut RowFeatures),
     sources: &[RowSource],
     context: &PrepareContext<'_>,
 ) -> (Gathered<W, P>, WideFrame<W>, WideFrame<W>) {
@@ -140,7 +141,8 @@ fn gather_bodies<W: Lanes<L>, const L: usize, const P: usize, const C: usize>(
         remove_parts(row, lane, source, context);
     }
     features.locks = side1.locked || side2.locked;
-    if features.any() {
+    debug_assert!(extra.is_some() || !features.any(), "the plan has missed {features:?}");
+    if let Some(extra) = extra.filter(|_| features.any()) {
         *extra = ExtraRow::EMPTY;
         (extra.free1, extra.free2) = (side1.free, side2.free);
     }
@@ -450,7 +452,7 @@ fn prepare_restitution<W: Lanes<L>, const L: usize, const P: usize, const C: usi
 pub(crate) struct SolvedRow<'a, W, const L: usize, const P: usize, const C: usize> {
     pub row: &'a NormalRow<W, L, P, C>,
     pub friction: &'a FrictionRow<W, P>,
-    pub extra: &'a ExtraRow<W, P>,
+    pub extra: Option<&'a ExtraRow<W, P>>,
     pub features: RowFeatures,
 }
 
@@ -542,7 +544,7 @@ pub(crate) fn store_lane<W: Lanes<L>, const L: usize, const P: usize, const C: u
         contact.total_impulse = outcome.totals[point][lane];
         slots &= slots - 1;
     }
-    if source.first && solved.features.rolling {
-        arbiter.data.rolling_impulse = solved.extra.rolling_impulse.get(lane);
+    if let (true, Some(extra)) = (source.first && solved.features.rolling, solved.extra) {
+        arbiter.data.rolling_impulse = extra.rolling_impulse.get(lane);
     }
 }

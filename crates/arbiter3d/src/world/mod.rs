@@ -37,6 +37,7 @@ use crate::math::{Pose, Real};
 use crate::parallel::StagePool;
 use crate::simd::SimdLevel;
 use crate::solver::{ContactSolver, RowPlan, SolverBodies, contact_solver};
+use crate::storage;
 use bodies::Body;
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -268,7 +269,7 @@ impl World {
             self.solver_bodies.reset(index as usize);
             index
         } else {
-            self.bodies.push(Body::new(self.tag.wrapping_add(1)));
+            storage::push(&mut self.bodies, Body::new(self.tag.wrapping_add(1)));
             self.solver_bodies.push();
             self.sleeping.reserve(self.bodies.len());
             (self.bodies.len() - 1) as u32

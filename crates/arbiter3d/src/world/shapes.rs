@@ -8,6 +8,7 @@ use crate::error::{Error, unit_rotation};
 use crate::id::{BodyId, ShapeId};
 use crate::math::{Aabb, Pose, Quat, Real, Vec3};
 use crate::shape::Shape;
+use crate::storage;
 
 /// What the world keeps of a shape.
 #[derive(Clone, Debug)]
@@ -244,7 +245,7 @@ impl World {
             self.shapes[slot as usize] = shape;
             slot
         } else {
-            self.shapes.push(shape);
+            storage::push(&mut self.shapes, shape);
             self.moved_shapes.push(false);
             (self.shapes.len() - 1) as u32
         };
