@@ -32,6 +32,7 @@ mod island;
 pub mod math;
 pub mod narrow_phase;
 mod parallel;
+mod place_table;
 mod query;
 mod shape;
 mod simd;

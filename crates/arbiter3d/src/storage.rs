@@ -2,7 +2,7 @@
 //!
 //! A `Vec` that grows doubles: on average a quarter of it is empty, in a large world many megabytes. [`push`] and [`reserve`]
 //! grow by an eighth instead: each entry is then moved eight times rather than once while a list fills up, which happens once
-//! in a world's life (and large blocks are mapped to another place rather than copied).
+//! in a world's life (and large blocks are mapped to another place rather than copied). Small lists double as ever.
 //!
 //! Lists that are filled and drained in every step have to hold the most that a step puts in, and the first step of a scene
 //! in which all contacts begin puts in a hundred times what later steps do. A [`Peak`] notes how full a list gets, and once
@@ -10,6 +10,8 @@
 
 /// Steps over which the most is taken.
 const WINDOW: u32 = 32;
+/// Bytes up to which a list may double.
+const SMALL: usize = 1 << 15;
 /// Entries that a list may have to spare in any case.
 const SPARE: usize = 64;
 
@@ -30,7 +32,8 @@ pub(crate) fn reserve<T>(list: &mut Vec<T>, count: usize) {
 
 #[cold]
 fn grow<T>(list: &mut Vec<T>, count: usize) {
-    list.reserve_exact(count + (count / 8).max(4) - list.len());
+    let small = count.min(SMALL / size_of::<T>().max(1)).max(4);
+    list.reserve_exact(count + small.max(count / 8) - list.len());
 }
 
 /// How full a list has been of late.
@@ -60,8 +63,9 @@ impl Peak {
 
 /// Gives back memory of a list that has to hold no more than `count` entries, if it is much.
 pub(crate) fn shrink<T>(list: &mut Vec<T>, count: usize) {
-    if list.capacity() > 2 * count + SPARE {
-        list.shrink_to(count + count / 2);
+    let wanted = count + count / 2 + SPARE;
+    if list.capacity() > 2 * wanted {
+        list.shrink_to(wanted);
     }
 }
 
@@ -70,15 +74,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_list_never_has_an_eighth_to_spare_and_moves_rarely() {
+    fn a_long_list_never_has_more_than_an_eighth_to_spare_and_moves_rarely() {
         let (mut list, mut moves) = (Vec::new(), 0);
         for i in 0..100_000_u32 {
             let before = list.capacity();
             push(&mut list, i);
             moves += usize::from(list.capacity() != before);
-            assert!(list.capacity() <= list.len() + (list.len() / 8).max(4), "{} for {}", list.capacity(), list.len());
+            assert!(
+                list.capacity() <= list.len() + (list.len() / 8).max(8192),
+                "{} for {}",
+                list.capacity(),
+                list.len()
+            );
         }
-        assert!(moves < 120, "{moves} times");
+        assert!(moves < 60, "{moves} times");
         assert!(list.iter().copied().eq(0..100_000));
     }
 
@@ -98,7 +107,7 @@ mod tests {
         }
         assert!(capacities[WINDOW as usize] >= 5_000);
         let kept = capacities[2 * WINDOW as usize];
-        assert!((319..800).contains(&kept), "{kept}");
+        assert!((319..1_200).contains(&kept), "{kept}");
         assert!(capacities[2 * WINDOW as usize..].iter().all(|&capacity| capacity == kept));
     }
 }

@@ -8,6 +8,7 @@
 use super::contact_data::ContactData;
 use super::key::ArbiterKey;
 use crate::id::BodyId;
+use crate::place_table::PlaceTable;
 use crate::storage::{self, Peak};
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
@@ -172,7 +173,7 @@ pub(crate) struct ArbiterStore {
     tag: u32,
     arbiters: Vec<Arbiter>,
     free: Vec<u32>,
-    by_key: IdMap<ArbiterKey, u32>,
+    by_key: PlaceTable,
     /// First list entry of each body, by body index.
     heads: Vec<u32>,
     /// Live arbiters of awake bodies: `sorted` in key order, `fresh` not merged yet.
@@ -231,7 +232,7 @@ impl ArbiterStore {
 
     /// The place of the live arbiter with this key.
     pub fn find(&self, key: ArbiterKey) -> Option<u32> {
-        self.by_key.get(&key).copied()
+        self.by_key.find(key.hash(), |place| self.arbiters[place as usize].key == key)
     }
 
     /// Makes an arbiter; the key must be free and the bodies different.
@@ -242,7 +243,8 @@ impl ArbiterStore {
         (arbiter.key, arbiter.body1, arbiter.body2) = (key, body1, body2);
         (arbiter.alive, arbiter.begun, arbiter.awake, arbiter.pair) = (true, false, false, NONE);
         arbiter.data = ContactData::default();
-        self.by_key.insert(key, index);
+        let arbiters = &self.arbiters;
+        self.by_key.insert(key.hash(), index, |place| arbiters[place as usize].key.hash());
         self.link(index, 0, body1.index);
         self.link(index, 1, body2.index);
         self.set_awake(index, true);
@@ -266,9 +268,7 @@ impl ArbiterStore {
             previous: [NONE; 2],
         };
         storage::push(&mut self.arbiters, arbiter);
-        // A table at most half full clears out removed keys in place; a fuller one would grow in the middle of a step. The
-        // free list has room for every place, for the same reason.
-        self.by_key.reserve(2 * self.arbiters.len() - self.by_key.len());
+        // The free list has room for every place: else it would grow in the middle of a step.
         storage::reserve(&mut self.free, self.arbiters.len());
         index
     }
@@ -280,7 +280,8 @@ impl ArbiterStore {
         arbiter.alive = false;
         arbiter.awake = false;
         let (key, body1, body2) = (arbiter.key, arbiter.body1.index, arbiter.body2.index);
-        self.by_key.remove(&key);
+        let arbiters = &self.arbiters;
+        self.by_key.remove(key.hash(), index, |place| arbiters[place as usize].key.hash());
         self.unlink(index, 0, body1);
         self.unlink(index, 1, body2);
         self.free.push(index);
@@ -397,7 +398,7 @@ impl ArbiterStore {
             return Err(format!("{live} live arbiters, {} keys, {} free", self.by_key.len(), self.free.len()));
         }
         for arbiter in self.iter() {
-            if self.by_key.get(&arbiter.key) != Some(&arbiter.id.index) {
+            if self.find(arbiter.key) != Some(arbiter.id.index) {
                 return Err(format!("{:?} is not found by its key", arbiter.id));
             }
             for body in [arbiter.body1.index, arbiter.body2.index] {
