@@ -32,10 +32,12 @@ mod island;
 pub mod math;
 pub mod narrow_phase;
 mod parallel;
+mod place_table;
 mod query;
 mod shape;
 mod simd;
 mod solver;
+mod storage;
 mod world;
 
 pub use arbiter::{Arbiter, ArbiterId, ArbiterKey, Contact, ContactData, ContactPoint, EndReason, SolveMode};

@@ -1,6 +1,7 @@
 //! How arbiters are told apart.
 
 use crate::id::ShapeId;
+use crate::place_table::mix;
 
 /// An ordered pair of numbers that names an arbiter: `(1, 2)` and `(2, 1)` are different keys.
 ///
@@ -24,6 +25,11 @@ impl ArbiterKey {
     #[must_use]
     pub const fn new(key1: u64, key2: u64) -> Self {
         Self { key1, key2 }
+    }
+
+    /// For the table in which arbiters are found.
+    pub(crate) fn hash(self) -> u64 {
+        mix(mix(0, self.key1), self.key2)
     }
 
     /// The key of the arbiter between two shapes, whichever order they are given in.

@@ -8,6 +8,8 @@
 use super::contact_data::ContactData;
 use super::key::ArbiterKey;
 use crate::id::BodyId;
+use crate::place_table::PlaceTable;
+use crate::storage::{self, Peak};
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
@@ -157,6 +159,13 @@ impl Hasher for IdHasher {
 /// A map whose keys are ids.
 pub(crate) type IdMap<K, V> = HashMap<K, V, BuildHasherDefault<IdHasher>>;
 
+/// An arbiter in the solving order: its place, and the generation by which one that has ended is told from its successor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Entry {
+    pub index: u32,
+    generation: u32,
+}
+
 /// The pool of arbiters.
 #[derive(Debug, Default)]
 pub(crate) struct ArbiterStore {
@@ -164,15 +173,16 @@ pub(crate) struct ArbiterStore {
     tag: u32,
     arbiters: Vec<Arbiter>,
     free: Vec<u32>,
-    by_key: IdMap<ArbiterKey, u32>,
+    by_key: PlaceTable,
     /// First list entry of each body, by body index.
     heads: Vec<u32>,
     /// Live arbiters of awake bodies: `sorted` in key order, `fresh` not merged yet.
-    sorted: Vec<(ArbiterKey, u32)>,
-    fresh: Vec<(ArbiterKey, u32)>,
+    sorted: Vec<Entry>,
+    fresh: Vec<Entry>,
+    fresh_peak: Peak,
     /// Live arbiters that users made.
     pub custom: u32,
-    merged: Vec<(ArbiterKey, u32)>,
+    merged: Vec<Entry>,
     stale: bool,
 }
 
@@ -222,7 +232,7 @@ impl ArbiterStore {
 
     /// The place of the live arbiter with this key.
     pub fn find(&self, key: ArbiterKey) -> Option<u32> {
-        self.by_key.get(&key).copied()
+        self.by_key.find(key.hash(), |place| self.arbiters[place as usize].key == key)
     }
 
     /// Makes an arbiter; the key must be free and the bodies different.
@@ -233,7 +243,8 @@ impl ArbiterStore {
         (arbiter.key, arbiter.body1, arbiter.body2) = (key, body1, body2);
         (arbiter.alive, arbiter.begun, arbiter.awake, arbiter.pair) = (true, false, false, NONE);
         arbiter.data = ContactData::default();
-        self.by_key.insert(key, index);
+        let arbiters = &self.arbiters;
+        self.by_key.insert(key.hash(), index, |place| arbiters[place as usize].key.hash());
         self.link(index, 0, body1.index);
         self.link(index, 1, body2.index);
         self.set_awake(index, true);
@@ -243,7 +254,7 @@ impl ArbiterStore {
     /// Makes the pool one place larger.
     fn add_place(&mut self, key: ArbiterKey, body1: BodyId, body2: BodyId) -> u32 {
         let index = u32::try_from(self.arbiters.len()).unwrap_or(NONE);
-        self.arbiters.push(Arbiter {
+        let arbiter = Arbiter {
             data: ContactData::default(),
             key,
             body1,
@@ -255,11 +266,10 @@ impl ArbiterStore {
             awake: false,
             next: [NONE; 2],
             previous: [NONE; 2],
-        });
-        // A table at most half full clears out removed keys in place; a fuller one would grow in the middle of a step. The
-        // free list has room for every place, for the same reason.
-        self.by_key.reserve(2 * self.arbiters.len() - self.by_key.len());
-        self.free.reserve(self.arbiters.len());
+        };
+        storage::push(&mut self.arbiters, arbiter);
+        // The free list has room for every place: else it would grow in the middle of a step.
+        storage::reserve(&mut self.free, self.arbiters.len());
         index
     }
 
@@ -270,7 +280,8 @@ impl ArbiterStore {
         arbiter.alive = false;
         arbiter.awake = false;
         let (key, body1, body2) = (arbiter.key, arbiter.body1.index, arbiter.body2.index);
-        self.by_key.remove(&key);
+        let arbiters = &self.arbiters;
+        self.by_key.remove(key.hash(), index, |place| arbiters[place as usize].key.hash());
         self.unlink(index, 0, body1);
         self.unlink(index, 1, body2);
         self.free.push(index);
@@ -283,26 +294,30 @@ impl ArbiterStore {
         if arbiter.awake != awake {
             arbiter.awake = awake;
             if awake {
-                self.fresh.push((arbiter.key, index));
+                storage::push(&mut self.fresh, Entry { index, generation: arbiter.id.generation });
             } else {
                 self.stale = true;
             }
         }
     }
 
-    /// Brings the solving order up to date and returns it: places of awake arbiters by key.
-    pub fn awake_by_key(&mut self) -> &[(ArbiterKey, u32)] {
+    /// Brings the solving order up to date and returns it: awake arbiters by key.
+    pub fn awake_by_key(&mut self) -> &[Entry] {
+        self.fresh_peak.note(self.fresh.len());
         if self.stale || !self.fresh.is_empty() {
-            self.fresh.sort_unstable();
             let arbiters = &self.arbiters;
-            let live = |entry: &&(ArbiterKey, u32)| {
-                let arbiter = &arbiters[entry.1 as usize];
-                arbiter.awake && arbiter.key == entry.0
+            let key = |entry: &Entry| arbiters[entry.index as usize].key;
+            let live = |entry: &&Entry| {
+                let arbiter = &arbiters[entry.index as usize];
+                arbiter.awake && arbiter.id.generation == entry.generation
             };
+            self.fresh.retain(|entry| live(&entry));
+            self.fresh.sort_unstable_by_key(key);
             self.merged.clear();
-            let mut fresh = self.fresh.iter().filter(live).peekable();
+            storage::reserve(&mut self.merged, self.sorted.len() + self.fresh.len());
+            let mut fresh = self.fresh.iter().peekable();
             for entry in self.sorted.iter().filter(live) {
-                while let Some(new) = fresh.next_if(|new| *new <= entry) {
+                while let Some(new) = fresh.next_if(|new| key(new) <= key(entry)) {
                     push_unique(&mut self.merged, *new);
                 }
                 push_unique(&mut self.merged, *entry);
@@ -314,6 +329,9 @@ impl ArbiterStore {
             self.fresh.clear();
             self.stale = false;
         }
+        if let Some(count) = self.fresh_peak.end_step() {
+            storage::shrink(&mut self.fresh, count);
+        }
         &self.sorted
     }
 
@@ -323,12 +341,12 @@ impl ArbiterStore {
     }
 
     /// The solving order as of the last [`ArbiterStore::awake_by_key`].
-    pub fn order(&self) -> &[(ArbiterKey, u32)] {
+    pub fn order(&self) -> &[Entry] {
         &self.sorted
     }
 
     /// Both the solving order and the places, to change.
-    pub fn order_and_slots_mut(&mut self) -> (&[(ArbiterKey, u32)], &mut [Arbiter]) {
+    pub fn order_and_slots_mut(&mut self) -> (&[Entry], &mut [Arbiter]) {
         (&self.sorted, &mut self.arbiters)
     }
 
@@ -380,7 +398,7 @@ impl ArbiterStore {
             return Err(format!("{live} live arbiters, {} keys, {} free", self.by_key.len(), self.free.len()));
         }
         for arbiter in self.iter() {
-            if self.by_key.get(&arbiter.key) != Some(&arbiter.id.index) {
+            if self.find(arbiter.key) != Some(arbiter.id.index) {
                 return Err(format!("{:?} is not found by its key", arbiter.id));
             }
             for body in [arbiter.body1.index, arbiter.body2.index] {
@@ -394,7 +412,7 @@ impl ArbiterStore {
 }
 
 /// Appends an entry unless it is there already: an arbiter that slept and woke since the last merge stands in both lists.
-fn push_unique(list: &mut Vec<(ArbiterKey, u32)>, entry: (ArbiterKey, u32)) {
+fn push_unique(list: &mut Vec<Entry>, entry: Entry) {
     if list.last() != Some(&entry) {
         list.push(entry);
     }
@@ -413,13 +431,13 @@ mod tests {
         let mut store = ArbiterStore::default();
         let c = store.create(ArbiterKey::new(3, 1), body(1), body(2));
         let a = store.create(ArbiterKey::new(1, 2), body(1), body(3));
-        assert_eq!(store.awake_by_key().iter().map(|e| e.1).collect::<Vec<_>>(), [a, c]);
+        assert_eq!(store.awake_by_key().iter().map(|e| e.index).collect::<Vec<_>>(), [a, c]);
         store.remove(c);
         let b = store.create(ArbiterKey::new(1, 3), body(2), body(3));
         assert_eq!(b, c, "the place is reused");
         store.set_awake(a, false);
         store.set_awake(a, true);
-        assert_eq!(store.awake_by_key().iter().map(|e| e.1).collect::<Vec<_>>(), [a, b]);
+        assert_eq!(store.awake_by_key().iter().map(|e| e.index).collect::<Vec<_>>(), [a, b]);
         store.validate().unwrap();
     }
 

@@ -7,6 +7,7 @@
 //! Roots are always the smallest member, so the result depends on the contacts and not on their order.
 
 use crate::arbiter::NONE;
+use crate::storage;
 
 /// Finds islands among the bodies of one step.
 #[derive(Clone, Debug, Default)]
@@ -58,8 +59,9 @@ pub(crate) struct SleepingIslands {
 impl SleepingIslands {
     /// Makes room for as many islands as there may be, so that falling asleep allocates nothing.
     pub fn reserve(&mut self, bodies: usize) {
-        self.first.reserve(bodies.saturating_sub(self.first.len()));
-        self.free.reserve(bodies.saturating_sub(self.free.len()));
+        storage::reserve(&mut self.first, bodies);
+        storage::reserve(&mut self.free, bodies);
+        storage::reserve(&mut self.next, bodies);
         self.next.resize(bodies.max(self.next.len()), NONE);
     }
 

@@ -3,6 +3,7 @@
 //! A block that has something to tell borrows a spare list, fills it without a lock, and hands it over when it ends. Blocks
 //! come in any order: whoever reads the list sorts it first.
 
+use crate::storage::{self, Peak};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// The gathered list, and spare ones for blocks to borrow.
@@ -15,11 +16,12 @@ pub(crate) struct Gather<T> {
 struct State<T> {
     list: Vec<T>,
     spares: Vec<Vec<T>>,
+    peak: Peak,
 }
 
 impl<T> Default for Gather<T> {
     fn default() -> Self {
-        Self { state: Mutex::new(State { list: Vec::new(), spares: Vec::new() }) }
+        Self { state: Mutex::new(State { list: Vec::new(), spares: Vec::new(), peak: Peak::default() }) }
     }
 }
 
@@ -28,9 +30,13 @@ impl<T> Gather<T> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Sets a spare list aside for each thread, with room for `capacity` entries.
+    /// Begins a stage: sets a spare list aside for each thread, with room for `capacity` entries, and gives back memory that
+    /// the stage has not needed of late.
     pub fn prepare(&mut self, threads: usize, capacity: usize) {
         let state = self.state.get_mut().unwrap_or_else(PoisonError::into_inner);
+        if let Some(count) = state.peak.end_step() {
+            storage::shrink(&mut state.list, count);
+        }
         while state.spares.len() < threads {
             state.spares.push(Vec::with_capacity(capacity));
         }
@@ -66,6 +72,9 @@ impl<T> Drop for BlockList<'_, T> {
     fn drop(&mut self) {
         if let Some(mut entries) = self.entries.take() {
             let mut state = self.gather.lock();
+            let count = state.list.len() + entries.len();
+            state.peak.note(count);
+            storage::reserve(&mut state.list, count);
             state.list.append(&mut entries);
             state.spares.push(entries);
         }

@@ -7,6 +7,7 @@
 use crate::math::{Pose, Real, Rotation, SymmetricMat3, Vec3};
 use crate::parallel::SharedSlice;
 use crate::simd::{LaneVec3, Lanes, Quad};
+use crate::storage;
 
 /// Marks a body index in a row whose body is not to be written.
 pub(crate) const READ_ONLY: u32 = 1 << 31;
@@ -26,7 +27,9 @@ pub(crate) struct BodyState {
     pub constrained: Real,
     /// Whether contacts can move the body at all: dynamic, enabled, not locked on all axes.
     pub moves: u32,
-    unused: [u32; 2],
+    /// Whether contacts cannot move it along some axis, but can along others.
+    pub locked: u32,
+    unused: u32,
 }
 
 impl BodyState {
@@ -38,7 +41,8 @@ impl BodyState {
         turn: Vec3::ZERO,
         constrained: 0.0,
         moves: 0,
-        unused: [0; 2],
+        locked: 0,
+        unused: 0,
     };
 }
 
@@ -192,9 +196,9 @@ pub(crate) struct SolverBodies {
 impl SolverBodies {
     /// Adds a slot.
     pub fn push(&mut self) {
-        self.states.push(BodyState::default());
-        self.masses.push(BodyMass::default());
-        self.motions.push(BodyMotion::default());
+        storage::push(&mut self.states, BodyState::default());
+        storage::push(&mut self.masses, BodyMass::default());
+        storage::push(&mut self.motions, BodyMotion::default());
     }
 
     /// Resets a slot.

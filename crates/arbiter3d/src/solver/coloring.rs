@@ -10,7 +10,9 @@
 //! how they came about.
 
 use super::bodies::SolverBodies;
-use crate::arbiter::{Arbiter, ArbiterKey, ONE_NORMAL, SLOTS};
+use crate::arbiter::{Arbiter, Entry, ONE_NORMAL, SLOTS};
+use crate::math::Vec3;
+use crate::storage;
 
 /// Colours for rows between two dynamic bodies.
 const DYNAMIC_COLORS: usize = 64;
@@ -32,13 +34,24 @@ pub(crate) struct RowSource {
     pub slots: u8,
     /// Whether rolling resistance acts here: once an arbiter.
     pub first: bool,
+    /// Whether the arbiter asks for what few rows need, or a body of it has a locked axis: see
+    /// [`super::rows::ExtraRow`].
+    pub extra: bool,
     color: u8,
-    class: u8,
 }
 
 impl RowSource {
     /// No row: an empty lane.
-    pub const NONE: Self = Self { arbiter: u32::MAX, slots: 0, first: false, color: 0, class: 0 };
+    pub const NONE: Self = Self { arbiter: u32::MAX, slots: 0, first: false, extra: false, color: 0 };
+
+    /// By its number of points: one, two, up to four.
+    fn class(self) -> usize {
+        match self.slots.count_ones() {
+            1 => 0,
+            2 => 1,
+            _ => 2,
+        }
+    }
 }
 
 /// Rows with one, two or up to four points are kept apart, so that a sphere's contact does not carry four.
@@ -68,12 +81,13 @@ pub(crate) struct RowPlan {
 
 impl RowPlan {
     /// Collects the rows of the awake arbiters and colours them.
-    pub fn build(&mut self, order: &[(ArbiterKey, u32)], arbiters: &mut [Arbiter], bodies: &mut SolverBodies) {
+    pub fn build(&mut self, order: &[Entry], arbiters: &mut [Arbiter], bodies: &mut SolverBodies) {
         self.used.resize(bodies.states.len(), 0);
         self.fixed_rows.resize(bodies.states.len(), 0);
         self.unsorted.clear();
-        for (i, &(_, index)) in order.iter().enumerate() {
-            if let Some(&(_, later)) = order.get(i + PREFETCH_AHEAD) {
+        storage::reserve(&mut self.unsorted, order.len());
+        for (i, &Entry { index, .. }) in order.iter().enumerate() {
+            if let Some(&Entry { index: later, .. }) = order.get(i + PREFETCH_AHEAD) {
                 crate::simd::prefetch(&arbiters[later as usize].body1);
                 crate::simd::prefetch(&arbiters[later as usize].data.usage_mask);
             }
@@ -96,10 +110,16 @@ impl RowPlan {
     /// Splits an arbiter into groups of equal normal and mode; each is a row.
     fn add_rows(&mut self, index: u32, arbiter: &Arbiter, bodies: &mut SolverBodies) {
         let data = &arbiter.data;
+        let locked = |body: u32| bodies.states[body as usize].locked != 0;
+        let extra = data.restitution > 0.0
+            || data.rolling_resistance > 0.0
+            || data.tangent_velocity != Vec3::ZERO
+            || locked(arbiter.body1.index)
+            || locked(arbiter.body2.index);
         if data.flags & ONE_NORMAL != 0 {
             let slots = data.usage_mask & 15;
-            let (color, class) = (self.color(arbiter, bodies), class_of(slots));
-            self.unsorted.push(RowSource { arbiter: index, slots, first: true, color, class });
+            let color = self.color(arbiter, bodies);
+            self.unsorted.push(RowSource { arbiter: index, slots, first: true, extra, color });
             return;
         }
         let mut left = data.usage_mask & 15;
@@ -115,8 +135,8 @@ impl RowPlan {
             // A normal that is not equal to itself cannot occur (validated), but must not loop.
             slots |= left & left.wrapping_neg();
             left &= !slots;
-            let (color, class) = (self.color(arbiter, bodies), class_of(slots));
-            self.unsorted.push(RowSource { arbiter: index, slots, first, color, class });
+            let color = self.color(arbiter, bodies);
+            self.unsorted.push(RowSource { arbiter: index, slots, first, extra, color });
             first = false;
         }
     }
@@ -150,7 +170,7 @@ impl RowPlan {
     fn sort(&mut self) {
         let mut counts = [0_u32; GROUPS * CLASSES + 1];
         for row in &self.unsorted {
-            counts[row.color as usize * CLASSES + row.class as usize + 1] += 1;
+            counts[row.color as usize * CLASSES + row.class() + 1] += 1;
         }
         for i in 1..counts.len() {
             counts[i] += counts[i - 1];
@@ -167,20 +187,12 @@ impl RowPlan {
             }
         }
         self.rows.clear();
+        storage::reserve(&mut self.rows, self.unsorted.len());
         self.rows.resize(self.unsorted.len(), RowSource::NONE);
         for row in &self.unsorted {
-            let next = &mut counts[row.color as usize * CLASSES + row.class as usize];
+            let next = &mut counts[row.color as usize * CLASSES + row.class()];
             self.rows[*next as usize] = *row;
             *next += 1;
         }
-    }
-}
-
-/// Class of a row by its number of points: one, two, up to four.
-fn class_of(slots: u8) -> u8 {
-    match slots.count_ones() {
-        1 => 0,
-        2 => 1,
-        _ => 2,
     }
 }

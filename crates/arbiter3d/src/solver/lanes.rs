@@ -12,6 +12,7 @@ use crate::parallel::{SharedSlice, StagePool};
 #[cfg(target_arch = "x86_64")]
 use crate::simd::{Avx2, Avx2Lanes, Avx512, Avx512Lanes, Sse2Lanes};
 use crate::simd::{Baseline, Instructions, Kernel, Lanes, SimdLevel, Wide, prefetch};
+use crate::storage;
 use std::marker::PhantomData;
 
 /// Wide rows that a thread takes at a time.
@@ -84,7 +85,10 @@ pub(crate) fn contact_solver(level: SimdLevel) -> Box<dyn ContactSolver> {
 struct RowSet<W, const L: usize, const P: usize, const C: usize> {
     normals: Vec<NormalRow<W, L, P, C>>,
     frictions: Vec<FrictionRow<W, P>>,
+    /// Those of the wide rows that need one, in their order.
     extras: Vec<ExtraRow<W, P>>,
+    /// How many extra rows stand before that of each wide row, and at the end how many there are.
+    extras_before: Vec<u32>,
     features: Vec<RowFeatures>,
     /// First source of each wide row, and how many there are.
     sources: Vec<(u32, u32)>,
@@ -98,6 +102,7 @@ impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> RowSet<W, L, P
             normals: Vec::new(),
             frictions: Vec::new(),
             extras: Vec::new(),
+            extras_before: Vec::new(),
             features: Vec::new(),
             sources: Vec::new(),
             groups: Vec::new(),
@@ -108,6 +113,8 @@ impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> RowSet<W, L, P
     fn lay_out(&mut self, plan: &RowPlan, class: usize) {
         self.sources.clear();
         self.groups.clear();
+        self.extras_before.clear();
+        let mut extras = 0;
         for group in &plan.groups {
             let first = self.sources.len() as u32;
             let (start, end) = group.ranges[class];
@@ -115,19 +122,23 @@ impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> RowSet<W, L, P
             let mut at = start;
             while at < end {
                 let count = width.min(end - at);
-                self.sources.push((at, count));
+                storage::push(&mut self.sources, (at, count));
+                storage::push(&mut self.extras_before, extras);
+                let mut needed = false;
+                for source in &plan.rows[at as usize..(at + count) as usize] {
+                    needed |= source.extra;
+                }
+                extras += u32::from(needed);
                 at += count;
             }
             self.groups.push((first, self.sources.len() as u32));
         }
-        // Rows are overwritten whole by `prepare_row`: only new ones need a value.
+        storage::push(&mut self.extras_before, extras);
         let count = self.sources.len();
-        if self.normals.len() < count {
-            self.normals.resize(count, NormalRow::EMPTY);
-            self.frictions.resize(count, FrictionRow::EMPTY);
-            self.extras.resize(count, ExtraRow::EMPTY);
-            self.features.resize(count, RowFeatures::default());
-        }
+        enlarge(&mut self.normals, count, NormalRow::EMPTY);
+        enlarge(&mut self.frictions, count, FrictionRow::EMPTY);
+        enlarge(&mut self.extras, extras as usize, ExtraRow::EMPTY);
+        enlarge(&mut self.features, count, RowFeatures::default());
     }
 
     /// Shares the wide rows of `range` among threads.
@@ -136,6 +147,7 @@ impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> RowSet<W, L, P
             normals: SharedSlice::new(&mut self.normals),
             frictions: SharedSlice::new(&mut self.frictions),
             extras: SharedSlice::new(&mut self.extras),
+            extras_before: &self.extras_before,
             features: SharedSlice::new(&mut self.features),
             sources: &self.sources,
             range,
@@ -153,6 +165,7 @@ struct SharedRows<'a, W, const L: usize, const P: usize, const C: usize> {
     normals: SharedSlice<'a, NormalRow<W, L, P, C>>,
     frictions: SharedSlice<'a, FrictionRow<W, P>>,
     extras: SharedSlice<'a, ExtraRow<W, P>>,
+    extras_before: &'a [u32],
     features: SharedSlice<'a, RowFeatures>,
     sources: &'a [(u32, u32)],
     range: (usize, usize),
@@ -170,12 +183,15 @@ impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> SharedRows<'_,
     unsafe fn block(&self, block: usize) -> Rows<'_, W, L, P, C> {
         let start = self.range.0 + block * ROWS_PER_BLOCK;
         let end = (start + ROWS_PER_BLOCK).min(self.range.1);
+        let extras_before = &self.extras_before[start..=end];
+        let extras = (extras_before[0] as usize, extras_before[end - start] as usize);
         // SAFETY: blocks do not overlap, and each is held once by the caller's promise.
         unsafe {
             Rows {
                 normals: self.normals.range_mut(start, end),
                 frictions: self.frictions.range_mut(start, end),
-                extras: self.extras.range_mut(start, end),
+                extras: self.extras.range_mut(extras.0, extras.1),
+                extras_before,
                 features: self.features.range_mut(start, end),
                 sources: &self.sources[start..end],
             }
@@ -188,8 +204,23 @@ struct Rows<'a, W, const L: usize, const P: usize, const C: usize> {
     normals: &'a mut [NormalRow<W, L, P, C>],
     frictions: &'a mut [FrictionRow<W, P>],
     extras: &'a mut [ExtraRow<W, P>],
+    extras_before: &'a [u32],
     features: &'a mut [RowFeatures],
     sources: &'a [(u32, u32)],
+}
+
+/// Makes a list of rows longer. Rows are overwritten whole by `prepare_row`: only new ones need a value.
+fn enlarge<T: Clone>(list: &mut Vec<T>, count: usize, empty: T) {
+    if list.len() < count {
+        storage::reserve(list, count);
+        list.resize(count, empty);
+    }
+}
+
+/// The extra row of wide row `i` of a block, if it has one.
+#[inline(always)]
+fn extra_of<'a, E>(extras: &'a mut [E], before: &[u32], i: usize) -> Option<&'a mut E> {
+    if before[i] == before[i + 1] { None } else { extras.get_mut((before[i] - before[0]) as usize) }
 }
 
 struct PrepareKernel<'a, W, const L: usize, const P: usize, const C: usize> {
@@ -211,7 +242,7 @@ impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> Kernel for Pre
             let target = RowTarget {
                 row: &mut block.normals[i],
                 friction: &mut block.frictions[i],
-                extra: &mut block.extras[i],
+                extra: extra_of(block.extras, block.extras_before, i),
                 features: &mut block.features[i],
             };
             let sources = &self.rows[first as usize..(first + count) as usize];
@@ -247,7 +278,7 @@ impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> Kernel for Sto
             let solved = SolvedRow {
                 row: &block.normals[i],
                 friction: &block.frictions[i],
-                extra: &block.extras[i],
+                extra: extra_of(block.extras, block.extras_before, i).map(|extra| &*extra),
                 features: block.features[i],
             };
             // SAFETY: storing writes no states.
@@ -281,7 +312,7 @@ impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> Kernel for Pas
             let row = RowPass {
                 row: &mut block.normals[i],
                 friction: &mut block.frictions[i],
-                extra: &mut block.extras[i],
+                extra: extra_of(block.extras, block.extras_before, i),
                 features: block.features[i],
                 states: self.states,
             };

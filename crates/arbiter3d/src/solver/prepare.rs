@@ -30,7 +30,8 @@ pub(crate) struct PrepareContext<'a> {
 pub(crate) struct RowTarget<'a, W, const L: usize, const P: usize, const C: usize> {
     pub row: &'a mut NormalRow<W, L, P, C>,
     pub friction: &'a mut FrictionRow<W, P>,
-    pub extra: &'a mut ExtraRow<W, P>,
+    /// There if the arbiters or bodies ask for it: [`RowSource::extra`].
+    pub extra: Option<&'a mut ExtraRow<W, P>>,
     pub features: &'a mut RowFeatures,
 }
 
@@ -59,15 +60,12 @@ struct Gathered<W, const P: usize> {
 static NO_CONTACT: Contact = Contact {
     local_anchor1: Vec3::ZERO,
     local_anchor2: Vec3::ZERO,
-    arm1: Vec3::ZERO,
-    arm2: Vec3::ZERO,
     normal: Vec3::ZERO,
     normal_impulse: 0.0,
     tangent_impulse: Vec3::ZERO,
     twist_impulse: 0.0,
     separation: 0.0,
     total_impulse: 0.0,
-    local_normal: Vec3::ZERO,
     feature: 0,
     remove: SolveMode::NONE,
     world_normal: false,
@@ -83,9 +81,9 @@ pub(crate) fn prepare_row<W: Lanes<L>, const L: usize, const P: usize, const C: 
     sources: &[RowSource],
     context: &PrepareContext<'_>,
 ) {
-    let RowTarget { row, friction, extra, features } = target;
+    let RowTarget { row, friction, mut extra, features } = target;
     *features = features_of(sources, context);
-    let mut gathered = gather_bodies((row, extra, features), sources, context);
+    let mut gathered = gather_bodies((row, extra.as_deref_mut(), features), sources, context);
     let (frame1, frame2) = (gathered.1, gathered.2);
     gather_points(row, &mut gathered.0, (&frame1, &frame2), (sources, context));
     let gathered = gathered.0;
@@ -96,7 +94,7 @@ pub(crate) fn prepare_row<W: Lanes<L>, const L: usize, const P: usize, const C: 
         coefficients[lane] = context.arbiters[source.arbiter as usize].data.friction;
     }
     friction.friction = W::from_array(coefficients);
-    if features.any() {
+    if let Some(extra) = extra.filter(|_| features.any()) {
         prepare_extra(row, friction, (extra, *features), sources, context);
     }
 }
@@ -117,7 +115,7 @@ fn features_of(sources: &[RowSource], context: &PrepareContext<'_>) -> RowFeatur
 /// Masses of both bodies, with the parts removed that the contact leaves alone.
 #[inline(always)]
 fn gather_bodies<W: Lanes<L>, const L: usize, const P: usize, const C: usize>(
-    (row, extra, features): (&mut NormalRow<W, L, P, C>, &mut ExtraRow<W, P>, &mut RowFeatures),
+    (row, extra, features): (&mut NormalRow<W, L, P, C>, Option<&mut ExtraRow<W, P>>, &mut RowFeatures),
     sources: &[RowSource],
     context: &PrepareContext<'_>,
 ) -> (Gathered<W, P>, WideFrame<W>, WideFrame<W>) {
@@ -140,7 +138,8 @@ fn gather_bodies<W: Lanes<L>, const L: usize, const P: usize, const C: usize>(
         remove_parts(row, lane, source, context);
     }
     features.locks = side1.locked || side2.locked;
-    if features.any() {
+    debug_assert!(extra.is_some() || !features.any(), "the plan has missed {features:?}");
+    if let Some(extra) = extra.filter(|_| features.any()) {
         *extra = ExtraRow::EMPTY;
         (extra.free1, extra.free2) = (side1.free, side2.free);
     }
@@ -235,11 +234,13 @@ fn gather_points<W: Lanes<L>, const L: usize, const P: usize, const C: usize>(
     (sources, context): (&[RowSource], &PrepareContext<'_>),
 ) {
     let mut contacts = [[&NO_CONTACT; L]; P];
+    let mut rotations = [&[[0.0; 4]; 2]; L];
     let mut present = [[0.0; L]; P];
     let mut fresh = false;
     for (lane, source) in sources.iter().enumerate().take(L) {
         let data = &context.arbiters[source.arbiter as usize].data;
         fresh |= data.flags & ONE_NORMAL == 0;
+        rotations[lane] = data.rotation_quads();
         let mut slots = source.slots;
         for point in 0..P {
             if slots != 0 {
@@ -250,22 +251,22 @@ fn gather_points<W: Lanes<L>, const L: usize, const P: usize, const C: usize>(
         }
     }
     let between = frame2.center - frame1.center;
+    let (then1, then2) = (load_rotation(&rotations, 0), load_rotation(&rotations, 1));
     for point in 0..P {
         gathered.present[point] = W::from_array(present[point]);
-        let mut records = [&[[0.0; 4]; 5]; L];
+        let mut records = [&[[0.0; 4]; 4]; L];
         for lane in 0..L {
             records[lane] = contacts[point][lane].quads();
         }
         let [x1, y1, z1, x2] = W::load_quad(&records, 0);
-        let [y2, z2, ax, ay] = W::load_quad(&records, 1);
-        let [az, bx, by, bz] = W::load_quad(&records, 2);
-        let [nx, ny, nz, impulse] = W::load_quad(&records, 3);
-        let [tx, ty, tz, twist] = W::load_quad(&records, 4);
-        let turned1 = frame1.rotation.rotate(&LaneVec3 { x: x1, y: y1, z: z1 });
-        let turned2 = frame2.rotation.rotate(&LaneVec3 { x: x2, y: y2, z: z2 });
+        let [y2, z2, nx, ny] = W::load_quad(&records, 1);
+        let [nz, impulse, tx, ty] = W::load_quad(&records, 2);
+        let [tz, twist, _, _] = W::load_quad(&records, 3);
+        let (anchor1, anchor2) = (LaneVec3 { x: x1, y: y1, z: z1 }, LaneVec3 { x: x2, y: y2, z: z2 });
+        let (turned1, turned2) = (frame1.rotation.rotate(&anchor1), frame2.rotation.rotate(&anchor2));
         gathered.apart[point] = between + (turned2 - turned1);
-        gathered.r1[point] = LaneVec3 { x: ax, y: ay, z: az };
-        gathered.r2[point] = LaneVec3 { x: bx, y: by, z: bz };
+        gathered.r1[point] = then1.rotate(&anchor1);
+        gathered.r2[point] = then2.rotate(&anchor2);
         if fresh {
             for (lane, contact) in contacts[point].iter().enumerate() {
                 if contact.world_normal {
@@ -281,6 +282,12 @@ fn gather_points<W: Lanes<L>, const L: usize, const P: usize, const C: usize>(
         gathered.tangential = gathered.tangential + LaneVec3 { x: tx, y: ty, z: tz };
         gathered.twist += twist;
     }
+}
+
+#[inline(always)]
+fn load_rotation<W: Lanes<L>, const L: usize>(records: &[&[Quad; 2]; L], side: usize) -> LaneRotation<W> {
+    let [x, y, z, w] = W::load_quad(records, side);
+    LaneRotation { vector: LaneVec3 { x, y, z }, w }
 }
 
 /// `a · M⁻¹ b`: the response along `a` to a linear impulse along `b`.
@@ -450,18 +457,15 @@ fn prepare_restitution<W: Lanes<L>, const L: usize, const P: usize, const C: usi
 pub(crate) struct SolvedRow<'a, W, const L: usize, const P: usize, const C: usize> {
     pub row: &'a NormalRow<W, L, P, C>,
     pub friction: &'a FrictionRow<W, P>,
-    pub extra: &'a ExtraRow<W, P>,
+    pub extra: Option<&'a ExtraRow<W, P>>,
     pub features: RowFeatures,
 }
 
 /// What goes back to the contacts of a wide row.
 pub(crate) struct Outcome<const L: usize, const P: usize> {
-    /// Normal and normal impulse of each point, by lane.
-    normals: [[Quad; L]; P],
-    /// Tangential and twist impulse of each point.
-    tangentials: [[Quad; L]; P],
-    gaps: [[f32; L]; P],
-    totals: [[f32; L]; P],
+    /// The last two groups of numbers of each point's [`Contact::quads`], by lane.
+    thirds: [[Quad; L]; P],
+    fourths: [[Quad; L]; P],
     /// How far past the break distance some contact may be: zero or less if all are within it. Else ask
     /// [`crate::arbiter::ContactData::break_contacts`].
     pub excess: [f32; L],
@@ -491,23 +495,16 @@ pub(crate) unsafe fn read_row<W: Lanes<L>, const L: usize, const P: usize, const
     let turned = d2.turn - d1.turn;
     let approach = n.dot(&moved) + row.offset.dot(&d2.turn);
     let (mut reach, mut widest) = (W::ZERO, W::splat(-Real::MAX));
-    let mut outcome = Outcome {
-        normals: [[[0.0; 4]; L]; P],
-        tangentials: [[[0.0; 4]; L]; P],
-        gaps: [[0.0; L]; P],
-        totals: friction.totals.map(W::to_array),
-        excess: [0.0; L],
-    };
+    let mut outcome = Outcome { thirds: [[[0.0; 4]; L]; P], fourths: [[[0.0; 4]; L]; P], excess: [0.0; L] };
     for i in 0..P {
         let impulse = row.impulses[i];
         // A quotient of the two: 1 / load is infinite for loads that are hardly numbers any more.
         let share = load.if_positive(impulse / load, W::ZERO);
         let part = tangential.scale(share);
-        outcome.normals[i] = W::store(&[n.x, n.y, n.z, impulse]);
-        outcome.tangentials[i] = W::store(&[part.x, part.y, part.z, friction.twist_impulse * share]);
         let point = &row.points[i];
         let gap = point.separation + approach + point.arm.dot(&turned);
-        outcome.gaps[i] = gap.to_array();
+        outcome.thirds[i] = W::store(&[n.z, impulse, part.x, part.y]);
+        outcome.fourths[i] = W::store(&[part.z, friction.twist_impulse * share, gap, friction.totals[i]]);
         // Points that a lane lacks are a kilometre apart.
         widest = (W::splat(900.0) - point.separation).if_positive(widest.max(gap), widest);
         reach = reach.max(friction.levers[i]);
@@ -537,12 +534,10 @@ pub(crate) fn store_lane<W: Lanes<L>, const L: usize, const P: usize, const C: u
         }
         let contact = &mut arbiter.data.slots[slots.trailing_zeros() as usize % SLOTS];
         let quads = contact.quads_mut();
-        (quads[3], quads[4]) = (outcome.normals[point][lane], outcome.tangentials[point][lane]);
-        contact.separation = outcome.gaps[point][lane];
-        contact.total_impulse = outcome.totals[point][lane];
+        (quads[2], quads[3]) = (outcome.thirds[point][lane], outcome.fourths[point][lane]);
         slots &= slots - 1;
     }
-    if source.first && solved.features.rolling {
-        arbiter.data.rolling_impulse = solved.extra.rolling_impulse.get(lane);
+    if let (true, Some(extra)) = (source.first && solved.features.rolling, solved.extra) {
+        arbiter.data.rolling_impulse = extra.rolling_impulse.get(lane);
     }
 }

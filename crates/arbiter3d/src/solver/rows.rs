@@ -12,7 +12,8 @@
 //!
 //! What both passes need stands in [`NormalRow`]; what only the relax pass needs stands in [`FrictionRow`], so that the
 //! biased pass streams less memory: passes over more rows than the cache holds take as long as their bytes. What few rows
-//! need (rolling, restitution, conveyors, locked axes) stands in [`ExtraRow`], read where [`RowFeatures`] say so.
+//! need (rolling, restitution, conveyors, locked axes) stands in [`ExtraRow`]: only those wide rows have one that ask for it,
+//! and it is read where [`RowFeatures`] say so.
 
 use crate::simd::{LaneSymmetric, LaneVec3, Lanes, Number};
 

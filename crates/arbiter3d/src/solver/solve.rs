@@ -70,7 +70,8 @@ pub(crate) struct PassParameters {
 pub(crate) struct RowPass<'a, W, const L: usize, const P: usize, const C: usize> {
     pub row: &'a mut NormalRow<W, L, P, C>,
     pub friction: &'a mut FrictionRow<W, P>,
-    pub extra: &'a mut ExtraRow<W, P>,
+    /// There if `features` has any.
+    pub extra: Option<&'a mut ExtraRow<W, P>>,
     pub features: RowFeatures,
     pub states: &'a SharedStates<'a>,
 }
@@ -100,7 +101,10 @@ impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> RowPass<'_, W,
         let tangents = Tangents::of(self.row, self.friction);
         self.apply_friction(&tangents, [self.friction.impulse1, self.friction.impulse2], &mut sides);
         let twist = self.row.normal.scale(self.friction.twist_impulse);
-        let torque = if self.features.rolling { twist + self.extra.rolling_impulse } else { twist };
+        let torque = match &self.extra {
+            Some(extra) if self.features.rolling => twist + extra.rolling_impulse,
+            _ => twist,
+        };
         self.apply_torque(&torque, &mut sides);
         // SAFETY: promised by the caller.
         unsafe { self.scatter(&sides) };
@@ -154,13 +158,11 @@ impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> RowPass<'_, W,
     /// No other thread may touch the dynamic bodies of the row.
     #[inline(always)]
     pub unsafe fn restitute(self, pass: &PassParameters) {
-        if !self.features.restitution {
-            return;
-        }
+        let Some(extra) = self.extra.as_deref().filter(|_| self.features.restitution) else { return };
         // SAFETY: promised by the caller.
         let mut sides = unsafe { self.gather() };
         let mut velocities = self.normal_velocities(&sides);
-        let (row, friction, extra) = (&mut *self.row, &mut *self.friction, &*self.extra);
+        let (row, friction) = (&mut *self.row, &mut *self.friction);
         let threshold = W::splat(-pass.restitution_threshold);
         let mut own = [W::ZERO; P];
         for (own, point) in own.iter_mut().zip(&row.points) {
@@ -287,11 +289,12 @@ impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> RowPass<'_, W,
     /// Rolling resistance: a torque against the relative spin, limited by the load.
     #[inline(always)]
     fn solve_rolling(&mut self, load: W, sides: &mut Sides<W>) {
+        let Some(extra) = &mut self.extra else { return };
         let response = self.row.inverse_inertia1.add(&self.row.inverse_inertia2);
-        let old = self.extra.rolling_impulse;
+        let old = extra.rolling_impulse;
         let wanted = old - response.solve(&(sides.v2.angular - sides.v1.angular));
-        let new = wanted.scale(cone_scale(wanted.dot(&wanted), self.extra.rolling_resistance * load));
-        self.extra.rolling_impulse = new;
+        let new = wanted.scale(cone_scale(wanted.dot(&wanted), extra.rolling_resistance * load));
+        extra.rolling_impulse = new;
         self.apply_torque(&(new - old), sides);
     }
 
@@ -317,8 +320,8 @@ impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> RowPass<'_, W,
         let slide = sides.v2.linear - sides.v1.linear + sides.v2.angular.cross(&friction.lever2)
             - sides.v1.angular.cross(&friction.lever1);
         let (mut slip1, mut slip2) = (tangents.first.dot(&slide), tangents.second.dot(&slide));
-        if self.features.conveyor {
-            (slip1, slip2) = (slip1 - self.extra.target1, slip2 - self.extra.target2);
+        if let (true, Some(extra)) = (self.features.conveyor, &self.extra) {
+            (slip1, slip2) = (slip1 - extra.target1, slip2 - extra.target2);
         }
         let (old1, old2) = (friction.impulse1, friction.impulse2);
         let wanted1 = old1 - (friction.mass11 * slip1 + friction.mass12 * slip2);
@@ -355,8 +358,8 @@ impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> RowPass<'_, W,
     fn apply_linear(&self, impulse: &LaneVec3<W>, sides: &mut Sides<W>) {
         let mut push1 = impulse.scale(self.row.inverse_mass1);
         let mut push2 = impulse.scale(self.row.inverse_mass2);
-        if self.features.locks {
-            (push1, push2) = (push1.times(&self.extra.free1), push2.times(&self.extra.free2));
+        if let (true, Some(extra)) = (self.features.locks, &self.extra) {
+            (push1, push2) = (push1.times(&extra.free1), push2.times(&extra.free2));
         }
         sides.v1.linear = sides.v1.linear - push1;
         sides.v2.linear = sides.v2.linear + push2;

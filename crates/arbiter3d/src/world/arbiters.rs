@@ -11,6 +11,7 @@ use crate::error::{Error, finite_vec, unit_vec};
 use crate::id::BodyId;
 use crate::math::{Real, Rotation, Vec3, max};
 use crate::shape::Shape;
+use crate::storage;
 use std::ops::Range;
 
 /// Ids that one call may reserve.
@@ -169,14 +170,15 @@ impl World {
         let arbiter = self.arbiters.at(index);
         let (b1, b2, pair) = (arbiter.body1.index, arbiter.body2.index, arbiter.pair);
         if arbiter.begun {
-            self.events.pending_ends.push(EndEvent {
+            let event = EndEvent {
                 arbiter: arbiter.id,
                 key: arbiter.key,
                 body1: arbiter.body1,
                 body2: arbiter.body2,
                 reason,
                 data: arbiter.data,
-            });
+            };
+            storage::push(&mut self.events.pending_ends, event);
         }
         if pair == NONE {
             self.arbiters.custom -= 1;

@@ -670,7 +670,9 @@ impl World {
             SymmetricMat3::ZERO
         };
         let moves = dynamic && (free_linear != Vec3::ZERO || free_angular != Vec3::ZERO);
-        self.solver_bodies.states[index as usize].moves = u32::from(moves);
+        let state = &mut self.solver_bodies.states[index as usize];
+        state.moves = u32::from(moves);
+        state.locked = u32::from(moves && free_linear != Vec3::ONE);
     }
 
     pub(crate) fn end_arbiters_of(&mut self, index: u32, reason: EndReason) {

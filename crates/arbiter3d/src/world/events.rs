@@ -14,6 +14,7 @@ use crate::arbiter::{Arbiter, ArbiterId, ArbiterKey, ContactData, ContactPoint, 
 use crate::error::Error;
 use crate::id::{BodyId, ShapeId};
 use crate::math::{Aabb, Real};
+use crate::storage::{self, Peak};
 
 /// An arbiter has begun.
 ///
@@ -325,11 +326,12 @@ impl Listeners {
 pub(crate) struct EventList<T> {
     pub events: Vec<T>,
     seen: usize,
+    peak: Peak,
 }
 
 impl<T> Default for EventList<T> {
     fn default() -> Self {
-        Self { events: Vec::new(), seen: 0 }
+        Self { events: Vec::new(), seen: 0, peak: Peak::default() }
     }
 }
 
@@ -342,6 +344,10 @@ impl<T> EventList<T> {
 
     fn end_step(&mut self) {
         self.seen = self.events.len();
+        self.peak.note(self.seen);
+        if let Some(count) = self.peak.end_step() {
+            storage::shrink(&mut self.events, count);
+        }
     }
 
     fn drain(&mut self) -> std::vec::Drain<'_, T> {
@@ -366,6 +372,9 @@ pub(crate) struct Events {
     /// Keys of the batch of ends with their places in it: sorted instead of the events, which are twenty times larger.
     end_order: Vec<(ArbiterKey, ArbiterId, u32)>,
     spare_removals: Vec<Removal>,
+    /// The most that a batch has held of late.
+    begin_peak: Peak,
+    end_peak: Peak,
 }
 
 impl Events {
@@ -384,6 +393,15 @@ impl Events {
         self.begin.end_step();
         self.end.end_step();
         self.sensor.end_step();
+        if let Some(count) = self.begin_peak.end_step() {
+            storage::shrink(&mut self.unbegun, count);
+            storage::shrink(&mut self.spare_unbegun, count);
+        }
+        if let Some(count) = self.end_peak.end_step() {
+            storage::shrink(&mut self.pending_ends, count);
+            storage::shrink(&mut self.spare_ends, count);
+            storage::shrink(&mut self.end_order, count);
+        }
     }
 }
 
@@ -455,6 +473,7 @@ impl World {
         while !self.events.unbegun.is_empty() {
             let mut batch = std::mem::take(&mut self.events.spare_unbegun);
             std::mem::swap(&mut batch, &mut self.events.unbegun);
+            self.events.begin_peak.note(batch.len());
             batch.sort_unstable();
             let heard = !self.listeners.are_deaf_to_begins();
             for (key, id) in batch.drain(..) {
@@ -463,7 +482,7 @@ impl World {
                 };
                 arbiter.begun = true;
                 let event = BeginEvent { arbiter: id, key, body1: arbiter.body1, body2: arbiter.body2 };
-                self.events.begin.events.push(event);
+                storage::push(&mut self.events.begin.events, event);
                 if heard {
                     let mut listeners = std::mem::take(&mut self.listeners);
                     listeners.begin(&mut StepContext::new(self), &event);
@@ -481,13 +500,14 @@ impl World {
             while !self.events.pending_ends.is_empty() {
                 let mut batch = std::mem::take(&mut self.events.spare_ends);
                 std::mem::swap(&mut batch, &mut self.events.pending_ends);
+                self.events.end_peak.note(batch.len());
                 let mut order = std::mem::take(&mut self.events.end_order);
                 order.extend((0..).zip(&batch).map(|(place, event)| (event.key, event.arbiter, place)));
                 order.sort_unstable();
                 let heard = !self.listeners.are_deaf_to_ends();
                 for (.., place) in order.drain(..) {
                     let event = &batch[place as usize];
-                    self.events.end.events.push(*event);
+                    storage::push(&mut self.events.end.events, *event);
                     if heard {
                         let mut listeners = std::mem::take(&mut self.listeners);
                         listeners.end(&mut StepContext::new(self), event);

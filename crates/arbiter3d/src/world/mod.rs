@@ -29,14 +29,16 @@ pub use shapes::{ShapeMut, ShapeRef};
 pub use step::StepReport;
 pub use timings::{Phase, Timings};
 
-use crate::arbiter::{ArbiterStore, EndReason, IdMap, NONE};
+use crate::arbiter::{ArbiterStore, EndReason, NONE};
 use crate::broad_phase::{BroadPhase, PairSet};
 use crate::error::unit_rotation;
 use crate::island::{IslandFinder, SleepingIslands};
 use crate::math::{Pose, Real};
 use crate::parallel::StagePool;
+use crate::place_table::PlaceTable;
 use crate::simd::SimdLevel;
 use crate::solver::{ContactSolver, RowPlan, SolverBodies, contact_solver};
+use crate::storage;
 use bodies::Body;
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -77,7 +79,8 @@ pub struct World {
     free_shapes: Vec<u32>,
     /// Shapes whose proxies have moved since the last narrow phase, by slot.
     moved_shapes: Vec<bool>,
-    shape_slots: IdMap<u64, u32>,
+    /// Places of the shapes, by id.
+    shape_slots: PlaceTable,
     broad_phase: BroadPhase,
     pairs: Vec<pairs::Pair>,
     free_pairs: Vec<u32>,
@@ -147,7 +150,7 @@ impl World {
             shapes: Vec::new(),
             free_shapes: Vec::new(),
             moved_shapes: Vec::new(),
-            shape_slots: IdMap::default(),
+            shape_slots: PlaceTable::default(),
             broad_phase: BroadPhase::new(),
             pairs: Vec::new(),
             free_pairs: Vec::new(),
@@ -268,7 +271,7 @@ impl World {
             self.solver_bodies.reset(index as usize);
             index
         } else {
-            self.bodies.push(Body::new(self.tag.wrapping_add(1)));
+            storage::push(&mut self.bodies, Body::new(self.tag.wrapping_add(1)));
             self.solver_bodies.push();
             self.sleeping.reserve(self.bodies.len());
             (self.bodies.len() - 1) as u32

@@ -10,6 +10,7 @@ use super::definition::BodyKind;
 use crate::arbiter::{EndReason, NONE};
 use crate::math::{Pose, Real, Rotation, Vec3, max, min};
 use crate::narrow_phase::PairCache;
+use crate::storage;
 
 /// What the world keeps of a pair. Shape 1 has the smaller id.
 #[derive(Clone, Debug)]
@@ -177,7 +178,7 @@ impl World {
             self.pairs[index as usize] = pair;
             index
         } else {
-            self.pairs.push(pair);
+            storage::push(&mut self.pairs, pair);
             (self.pairs.len() - 1) as u32
         };
         self.pair_set.insert(a, b, index);
@@ -294,7 +295,8 @@ mod tests {
                 set.insert(place);
             }
             if edit % 7 == 0 {
-                let bit = |place: &u32| set.words().get(*place as usize / 64).is_some_and(|w| w >> (place % 64) & 1 == 1);
+                let bit =
+                    |place: &u32| set.words().get(*place as usize / 64).is_some_and(|w| w >> (place % 64) & 1 == 1);
                 assert!((0..300).filter(bit).eq(model.iter().copied()));
                 assert_eq!(set.len(), model.len());
             }

@@ -7,7 +7,9 @@ use crate::broad_phase::TreeKind;
 use crate::error::{Error, unit_rotation};
 use crate::id::{BodyId, ShapeId};
 use crate::math::{Aabb, Pose, Quat, Real, Vec3};
+use crate::place_table::mix;
 use crate::shape::Shape;
+use crate::storage;
 
 /// What the world keeps of a shape.
 #[derive(Clone, Debug)]
@@ -211,7 +213,8 @@ impl<'a> ShapeMut<'a> {
 
 impl World {
     pub(crate) fn shape_slot(&self, id: ShapeId) -> Result<u32, Error> {
-        self.shape_slots.get(&id.0).copied().ok_or(Error::UnknownShape { id })
+        let found = self.shape_slots.find(mix(0, id.0), |slot| self.shapes[slot as usize].id == id);
+        found.ok_or(Error::UnknownShape { id })
     }
 
     /// Attaches a shape to a body and returns its id. The body's mass follows unless it was given.
@@ -244,11 +247,12 @@ impl World {
             self.shapes[slot as usize] = shape;
             slot
         } else {
-            self.shapes.push(shape);
+            storage::push(&mut self.shapes, shape);
             self.moved_shapes.push(false);
             (self.shapes.len() - 1) as u32
         };
-        self.shape_slots.insert(id.0, slot);
+        let shapes = &self.shapes;
+        self.shape_slots.insert(mix(0, id.0), slot, |slot| mix(0, shapes[slot as usize].id.0));
         let owner = &mut self.bodies[index as usize];
         if owner.shapes.is_empty() {
             // Most bodies have one shape: without this, room for four.
@@ -289,9 +293,10 @@ impl World {
     /// Frees the place of a shape; the body's lists are the caller's to mend.
     pub(crate) fn drop_shape(&mut self, slot: u32, reason: EndReason) {
         self.remove_proxy(slot, reason);
-        let shape = &mut self.shapes[slot as usize];
-        self.shape_slots.remove(&shape.id.0);
-        shape.body = NONE;
+        let shapes = &self.shapes;
+        let hash = |slot: u32| mix(0, shapes[slot as usize].id.0);
+        self.shape_slots.remove(hash(slot), slot, hash);
+        self.shapes[slot as usize].body = NONE;
         self.free_shapes.push(slot);
     }
 

@@ -143,8 +143,8 @@ impl World {
     fn join_islands(&mut self, finder: &mut crate::island::IslandFinder) {
         finder.reset(self.bodies.len(), self.awake.iter().copied());
         self.arbiters.awake_by_key();
-        for &(_, index) in self.arbiters.order() {
-            let arbiter = self.arbiters.at(index);
+        for entry in self.arbiters.order() {
+            let arbiter = self.arbiters.at(entry.index);
             let (a, b) = (arbiter.body1.index, arbiter.body2.index);
             if self.bodies[a as usize].is_dynamic() && self.bodies[b as usize].is_dynamic() {
                 finder.join(a, b);

@@ -5,7 +5,7 @@ use super::bodies::world_inverse_inertia;
 use super::collide::shapes_overlap;
 use super::pairs::PairRules;
 use super::timings::{Phase, PhaseClock, Timings};
-use crate::arbiter::{EndReason, NONE};
+use crate::arbiter::{EndReason, Entry, NONE};
 use crate::broad_phase::Boxes;
 use crate::error::{Error, in_range};
 use crate::id::BodyId;
@@ -411,7 +411,7 @@ impl World {
         let mut empty = std::mem::take(&mut self.narrow.empty);
         self.break_contacts(&mut empty);
         let custom = if self.arbiters.custom > 0 { self.arbiters.order() } else { &[] };
-        for &(_, index) in custom {
+        for &Entry { index, .. } in custom {
             let arbiter = self.arbiters.at(index);
             if arbiter.alive && arbiter.pair == NONE && arbiter.data.usage_mask & 15 == 0 {
                 empty.push(index);

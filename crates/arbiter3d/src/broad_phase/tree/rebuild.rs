@@ -15,6 +15,9 @@ use crate::math::{Aabb, Real, Vec3, max3, min3};
 /// Intervals of the longest axis whose borders a [`Split::Surface`] tries.
 const BINS: usize = 8;
 
+/// Room for what waits on the way down a tree, so that a deeper one than before needs no new memory.
+const STACK: usize = MAX_HEIGHT as usize + 1;
+
 /// A subtree that a rebuild joins to others.
 #[derive(Clone, Copy, Debug)]
 struct Item {
@@ -84,6 +87,7 @@ impl DynamicTree {
         let mut buffers = std::mem::take(&mut self.build);
         self.take_apart(replace, &mut buffers);
         buffers.ranges.clear();
+        buffers.ranges.reserve(STACK);
         buffers.ranges.push(Range { start: 0, end: buffers.items.len(), slot: Slot::ROOT });
         while let Some(range) = buffers.ranges.pop() {
             self.build_range(range, split, &mut buffers);
@@ -99,6 +103,7 @@ impl DynamicTree {
         buffers.items.clear();
         buffers.nodes.clear();
         // The stack is a vector: this is also how a tree above the height limit is cured.
+        buffers.stack.reserve(STACK);
         buffers.stack.push(self.root);
         while let Some(link) = buffers.stack.pop() {
             if link.is_leaf() || !replace(link) {

@@ -10,7 +10,7 @@ use super::super::shapes::ShapeSlot;
 use super::contacts::{PairFrame, Places, WideFrame, turn_levers, update_contacts};
 use super::{Begin, CollideContext, News};
 use crate::arbiter::{Arbiter, ArbiterKey, ContactData, NONE, TANGENT_VELOCITY_OVERRIDDEN};
-use crate::math::{Pose, Real, max, min};
+use crate::math::{Pose, Real, Rotation, max, min};
 use crate::narrow_phase::{CuboidAxes, CuboidLanes, Manifold, NearCuboids, collide};
 use crate::parallel::{BlockList, SharedSlice};
 use crate::shape::Shape;
@@ -192,7 +192,7 @@ impl<const L: usize> BlockKernel<'_, L> {
             }
             if holds && !same_axes {
                 pair.manifold_rotation = rotations[0];
-                turn_levers(&mut arbiter.data, rotations[0], rotations[1]);
+                turn_levers(&mut arbiter.data, rotations);
             }
         }
     }
@@ -303,7 +303,8 @@ impl<const L: usize> BlockKernel<'_, L> {
         let (pair, arbiter) = self.pairs.pair_and_arbiter(item.pair);
         context.note_fresh(pair, item, arbiter.is_some() || places.count == 0);
         if let Some(arbiter) = arbiter {
-            update_contacts(&mut arbiter.data, places, context.settings.contact_break_distance);
+            let rotations = context.rotations(pair);
+            update_contacts(&mut arbiter.data, places, rotations, context.settings.contact_break_distance);
             if places.count == 0 {
                 self.news.push(News::Empty(pair.arbiter));
             }
@@ -324,7 +325,7 @@ pub(super) fn shapes_relative(between: &Pose, s1: &ShapeSlot, s2: &ShapeSlot) ->
 }
 
 /// Surface velocities turn with their bodies.
-fn turn_conveyor(pair: &Pair, shapes: &[ShapeSlot], rotations: [crate::math::Rotation; 2], data: &mut ContactData) {
+fn turn_conveyor(pair: &Pair, shapes: &[ShapeSlot], rotations: [Rotation; 2], data: &mut ContactData) {
     if data.flags & TANGENT_VELOCITY_OVERRIDDEN == 0 {
         let materials = pair.shapes.map(|slot| &shapes[slot as usize].material);
         data.tangent_velocity = surface_velocity(materials, rotations);
@@ -373,16 +374,23 @@ impl CollideContext<'_> {
         pair.manifold_rotation = self.solver.masses[pair.bodies[0] as usize].rotation;
     }
 
+    /// How both bodies are turned.
+    #[inline(always)]
+    fn rotations(&self, pair: &Pair) -> [Rotation; 2] {
+        pair.bodies.map(|body| self.solver.masses[body as usize].rotation)
+    }
+
     /// Whether a pair without arbiter touches, or closes fast enough to touch within this step.
     fn begins(&self, pair: &Pair, places: &Places) -> bool {
         let [(v1, a1), (v2, a2)] =
             pair.bodies.map(|body| (&self.solver.states[body as usize], &self.solver.motions[body as usize]));
+        let [rotation1, rotation2] = self.rotations(pair);
         places.points[..places.count].iter().any(|point| {
             if point.separation <= 0.0 {
                 return true;
             }
-            let velocity1 = v1.linear_velocity + v1.angular_velocity.cross(point.arm1);
-            let velocity2 = v2.linear_velocity + v2.angular_velocity.cross(point.arm2);
+            let velocity1 = v1.linear_velocity + v1.angular_velocity.cross(rotation1.rotate(point.anchor1));
+            let velocity2 = v2.linear_velocity + v2.angular_velocity.cross(rotation2.rotate(point.anchor2));
             let speed =
                 point.normal.dot(velocity2 - velocity1) + point.normal.dot(a2.acceleration - a1.acceleration) * self.dt;
             point.separation + speed * self.dt <= 0.0

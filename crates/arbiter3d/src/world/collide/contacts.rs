@@ -4,7 +4,7 @@
 //! `c₂, q₂`, a point `p₁` seen from the centre of body 1 and its gap `s` along the world normal `n` give
 //!
 //! ```text
-//! arm₁ = q₁ p₁,  arm₂ = arm₁ + s n − (c₂ − c₁),  anchor₁ = p₁,  anchor₂ = q₂⁻¹ arm₂
+//! anchor₁ = p₁,  anchor₂ = q₂⁻¹ (q₁ p₁ + s n − (c₂ − c₁))
 //! ```
 
 use super::super::pairs::Pair;
@@ -20,25 +20,14 @@ use crate::solver::SolverBodies;
 pub(super) struct Place {
     pub anchor1: Vec3,
     pub anchor2: Vec3,
-    pub arm1: Vec3,
-    pub arm2: Vec3,
     pub normal: Vec3,
-    pub local_normal: Vec3,
     pub separation: Real,
     pub feature: u32,
 }
 
 impl Place {
-    const NOWHERE: Self = Self {
-        anchor1: Vec3::ZERO,
-        anchor2: Vec3::ZERO,
-        arm1: Vec3::ZERO,
-        arm2: Vec3::ZERO,
-        normal: Vec3::ZERO,
-        local_normal: Vec3::ZERO,
-        separation: 0.0,
-        feature: 0,
-    };
+    const NOWHERE: Self =
+        Self { anchor1: Vec3::ZERO, anchor2: Vec3::ZERO, normal: Vec3::ZERO, separation: 0.0, feature: 0 };
 }
 
 /// Up to four places.
@@ -86,16 +75,12 @@ impl PairFrame {
 
     fn place(&self, point: &ManifoldPoint) -> Place {
         let anchor1 = self.shape.transform_point(point.point1);
-        let local_normal = self.shape.rotation.rotate(point.normal);
-        let (arm1, normal) = (self.rotation1.rotate(anchor1), self.rotation1.rotate(local_normal));
-        let arm2 = arm1 + normal * point.separation - self.apart;
+        let normal = self.rotation1.rotate(self.shape.rotation.rotate(point.normal));
+        let arm2 = self.rotation1.rotate(anchor1) + normal * point.separation - self.apart;
         Place {
             anchor1,
             anchor2: self.rotation2.inverse_rotate(arm2),
-            arm1,
-            arm2,
             normal,
-            local_normal,
             separation: point.separation,
             feature: point.feature,
         }
@@ -130,14 +115,12 @@ impl<const L: usize> WideFrame<L> {
     /// What [`PairFrame::place`] does to each point of each lane.
     #[inline(always)]
     pub fn places(&self, manifold: &WideManifold<L>) -> WidePlaces<L> {
-        let local_normal = self.shape.rotation.rotate(&manifold.normal);
-        let normal = self.rotation1.rotate(&local_normal);
-        let mut places = WidePlaces { points: [[WideVec3::ZERO; 4]; SLOTS], local_normal, normal };
+        let normal = self.rotation1.rotate(&self.shape.rotation.rotate(&manifold.normal));
+        let mut places = WidePlaces { points: [[WideVec3::ZERO; 2]; SLOTS], normal };
         for (i, place) in places.points.iter_mut().enumerate() {
             let anchor1 = self.shape.rotation.rotate(&manifold.point1[i]) + self.shape.position;
-            let arm1 = self.rotation1.rotate(&anchor1);
-            let arm2 = arm1 + normal.scale(manifold.separation[i]) - self.apart;
-            *place = [anchor1, self.rotation2.inverse_rotate(&arm2), arm1, arm2];
+            let arm2 = self.rotation1.rotate(&anchor1) + normal.scale(manifold.separation[i]) - self.apart;
+            *place = [anchor1, self.rotation2.inverse_rotate(&arm2)];
         }
         places
     }
@@ -145,9 +128,8 @@ impl<const L: usize> WideFrame<L> {
 
 /// [`Places`] of `L` pairs.
 pub(super) struct WidePlaces<const L: usize> {
-    /// Anchors, then arms.
-    points: [[WideVec3<L>; 4]; SLOTS],
-    local_normal: WideVec3<L>,
+    /// Both anchors of each point.
+    points: [[WideVec3<L>; 2]; SLOTS],
     normal: WideVec3<L>,
 }
 
@@ -156,23 +138,24 @@ impl<const L: usize> WidePlaces<L> {
     pub fn get(&self, lane: usize, manifold: &WideManifold<L>) -> Places {
         let mut places = Places::NONE;
         places.count = manifold.count[lane] as usize;
-        let (normal, local_normal) = (self.normal.get(lane), self.local_normal.get(lane));
+        let normal = self.normal.get(lane);
         for (i, place) in places.points.iter_mut().enumerate().take(places.count) {
-            let [anchor1, anchor2, arm1, arm2] = self.points[i].each_ref().map(|wide| wide.get(lane));
+            let [anchor1, anchor2] = self.points[i].each_ref().map(|wide| wide.get(lane));
             let (separation, feature) = (manifold.separation[i][lane], manifold.feature[i][lane]);
-            *place = Place { anchor1, anchor2, arm1, arm2, normal, local_normal, separation, feature };
+            *place = Place { anchor1, anchor2, normal, separation, feature };
         }
         places
     }
 }
 
 /// Turns normals and levers to where the bodies have turned.
-pub(super) fn turn_levers(data: &mut ContactData, rotation1: Rotation, rotation2: Rotation) {
-    for contact in &mut data.slots {
-        contact.arm1 = rotation1.rotate(contact.local_anchor1);
-        contact.arm2 = rotation2.rotate(contact.local_anchor2);
+pub(super) fn turn_levers(data: &mut ContactData, rotations: [Rotation; 2]) {
+    let then = std::mem::replace(&mut data.rotations, rotations)[0];
+    for slot in (0..SLOTS).filter(|slot| data.usage_mask >> slot & 1 == 1) {
+        let contact = &mut data.slots[slot];
         if !contact.world_normal {
-            contact.normal = rotation1.rotate(contact.local_normal);
+            let normal = rotations[0].rotate(then.inverse_rotate(contact.normal));
+            contact.normal = normal / normal.length(); // else rounding adds up, turn by turn
         }
     }
 }
@@ -180,8 +163,10 @@ pub(super) fn turn_levers(data: &mut ContactData, rotation1: Rotation, rotation2
 /// Replaces the contacts of an arbiter by those of a new manifold; points that were there before keep their slot and
 /// impulses.
 ///
-/// A point is the same when its features are; else when an old one not yet taken is within the break distance.
-pub(super) fn update_contacts(data: &mut ContactData, places: &Places, break_distance: Real) {
+/// A point is the same when its features are; else when an old one not yet taken is within the break distance. `rotations`
+/// are those of the bodies.
+pub(super) fn update_contacts(data: &mut ContactData, places: &Places, rotations: [Rotation; 2], break_distance: Real) {
+    data.rotations = rotations;
     let points = &places.points[..places.count.min(SLOTS)];
     let mut matches = match_slots(data, points, break_distance);
     let mut used: u8 = matches.iter().filter(|&&slot| slot < SLOTS).fold(0, |mask, &slot| mask | 1 << slot);
@@ -199,7 +184,7 @@ pub(super) fn update_contacts(data: &mut ContactData, places: &Places, break_dis
         } else {
             contact.reset_impulses();
         }
-        one_normal &= place.local_normal == points[0].local_normal;
+        one_normal &= place.normal == points[0].normal;
     }
     data.usage_mask = data.usage_mask & 0xf0 | used;
     data.flags = data.flags & !ONE_NORMAL | if one_normal { ONE_NORMAL } else { 0 };
@@ -241,10 +226,7 @@ fn match_slots(data: &ContactData, points: &[Place], break_distance: Real) -> [u
 fn set_place(contact: &mut Contact, place: &Place) {
     contact.local_anchor1 = place.anchor1;
     contact.local_anchor2 = place.anchor2;
-    contact.arm1 = place.arm1;
-    contact.arm2 = place.arm2;
     contact.normal = place.normal;
-    contact.local_normal = place.local_normal;
     contact.separation = place.separation;
     contact.feature = place.feature;
     contact.remove = SolveMode::NONE;

@@ -167,7 +167,8 @@ impl World {
         };
         let arbiter = self.arbiters.at_mut(index);
         arbiter.pair = pair_index;
-        update_contacts(&mut arbiter.data, &begin.places, self.scaled.contact_break_distance);
+        let rotations = [center1.rotation, center2.rotation];
+        update_contacts(&mut arbiter.data, &begin.places, rotations, self.scaled.contact_break_distance);
         let pair = &mut self.pairs[pair_index as usize];
         (pair.arbiter, pair.has_manifold, pair.manifold_pose) = (index, reusable, between);
         self.mix_shape_materials(index);
