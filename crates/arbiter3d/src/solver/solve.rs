@@ -243,10 +243,12 @@ impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> RowPass<'_, W,
     #[inline(always)]
     fn closing_rate(&self, pass: &PassParameters) -> W {
         let rate = W::splat(pass.closing_rate);
-        if !self.features.restitution {
-            return rate;
+        match &self.extra {
+            Some(extra) if self.features.restitution => {
+                extra.restitution.if_positive(W::splat(pass.bouncing_rate), rate)
+            }
+            _ => rate,
         }
-        self.extra.restitution.if_positive(W::splat(pass.bouncing_rate), rate)
     }
 
     /// One Gauss–Seidel sweep over the points of a row.
