@@ -211,3 +211,56 @@ fn meshes_do_not_go_on_dynamic_bodies() {
     assert_eq!(world.body(fixed).unwrap().kind(), BodyKind::Static);
     world.body_mut(fixed).unwrap().set_kind(BodyKind::Kinematic).unwrap();
 }
+
+/// Corners of an upright six-sided prism.
+fn six_sided(radius: f32, low: f32, high: f32) -> Vec<Vec3> {
+    let corner = |i: usize, y: f32| {
+        let angle = std::f64::consts::TAU * i as f64 / 6.0;
+        Vec3::new(radius * libm::cos(angle) as f32, y, radius * libm::sin(angle) as f32)
+    };
+    (0..6).flat_map(|i| [corner(i, low), corner(i, high)]).collect()
+}
+
+/// A trunk of twenty tapering prisms, 40 m high, one body that tips over about its foot.
+fn falling_trunk(world: &mut World) -> BodyId {
+    let spin = Vec3::Z * -0.5;
+    let body = BodyDefinition::dynamic().at(Vec3::Y * 0.02).moving(spin.cross(Vec3::Y * 17.0), spin);
+    let body = world.add_body(&body).unwrap();
+    for part in 0..20_u8 {
+        let (low, radius) = (2.0 * f32::from(part), 0.75 * libm::powf(0.95, f32::from(part)));
+        let hull = Shape::hull(&six_sided(radius, low, low + 2.5)).unwrap();
+        world.add_shape(body, &ShapeDefinition::new(hull).density(1.0).friction(0.9).rolling_resistance(0.05)).unwrap();
+    }
+    body
+}
+
+/// Nothing bounces that is not elastic: a falling trunk, whose tip comes down at 35 m/s, lies where it has hit, on level
+/// ground and on waves, on whose crests it hits in several places one after the other.
+#[test]
+fn a_falling_trunk_does_not_bounce() {
+    let wave = |x: f32, z: f32| 0.4 * libm::sinf(0.628 * x) * libm::sinf(0.314 * z + 0.8);
+    let grounds = [(0.0, grid(120, 1.0, |_, _| 0.0, MeshSides::One)), (0.4, grid(120, 1.0, wave, MeshSides::One))];
+    for (amplitude, ground) in grounds {
+        let mut world = sleepless();
+        world.add_shape(BodyId::WORLD, &ShapeDefinition::new(ground).friction(0.9)).unwrap();
+        let trunk = falling_trunk(&mut world);
+        let (mut down, mut highest): (usize, f32) = (0, 0.0);
+        let (mut deepest, mut last): (f32, f32) = (0.0, 0.0);
+        for _ in 0..600 {
+            world.step(DT).unwrap();
+            let body = world.body(trunk).unwrap();
+            let axis = body.rotation() * Vec3::Y;
+            down += usize::from(down > 0 || axis.y < 0.0);
+            if down > 0 {
+                highest = highest.max(body.position().y).max((body.position() + axis * 40.0).y);
+            }
+            let gaps = world.arbiters().flat_map(|arbiter| arbiter.data().contacts()).map(|(_, c)| c.separation());
+            last = gaps.fold(0.0, f32::min);
+            deepest = deepest.min(last);
+        }
+        assert!(down > 200, "it has fallen: {down} steps ago");
+        // Lying, its axis is 0.75 m over the ground at its foot.
+        assert!(highest < amplitude + 1.0, "an end of the trunk rose to {highest} m over waves of {amplitude} m");
+        assert!(deepest > -0.1 && last > -0.005, "waves of {amplitude} m: {deepest} m deep, in the end {last} m");
+    }
+}

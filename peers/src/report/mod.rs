@@ -128,7 +128,7 @@ impl Row {
     }
 }
 
-/// Our time over the fastest peer's, on one scene.
+/// How many times as fast as the fastest peer we are, on one scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ratio {
     /// The scene.
@@ -137,7 +137,7 @@ pub struct Ratio {
     pub threads: usize,
     /// The fastest peer.
     pub peer: Kind,
-    /// Below 1 where we are faster.
+    /// The peer's time over ours: above 1 where we are faster.
     pub ratio: f64,
 }
 
@@ -148,7 +148,7 @@ pub fn ratios(rows: &[Row]) -> Vec<Ratio> {
         let same = |row: &&Row| row.scene == ours.scene && row.threads == ours.threads && row.engine != Kind::Arbiter;
         let peers = rows.iter().filter(same).filter(|row| row.counts());
         let fastest = peers.min_by(|a, b| a.median().total_cmp(&b.median()))?;
-        let ratio = ours.median() / fastest.median();
+        let ratio = fastest.median() / ours.median();
         Some(Ratio { scene: ours.scene.clone(), threads: ours.threads, peer: fastest.engine, ratio })
     };
     ours.filter_map(ratio).collect()
@@ -165,7 +165,7 @@ pub fn geometric_means(ratios: &[Ratio]) -> BTreeMap<usize, f64> {
 
 /// The scene on which we are slowest against the fastest peer.
 pub fn worst(ratios: &[Ratio]) -> Option<&Ratio> {
-    ratios.iter().max_by(|a, b| a.ratio.total_cmp(&b.ratio))
+    ratios.iter().min_by(|a, b| a.ratio.total_cmp(&b.ratio))
 }
 
 #[cfg(test)]
@@ -217,10 +217,10 @@ mod tests {
     fn ratios_are_to_the_fastest_peer_that_has_not_failed() {
         let ratios = ratios(&samples::rows());
         let seen: Vec<_> = ratios.iter().map(|r| (&r.scene[..], r.threads, r.peer, r.ratio)).collect();
-        let expected = [("a", 1, Kind::Box3d, 0.5), ("b", 1, Kind::Rapier, 2.0), ("b", 2, Kind::Rapier, 1.5)];
+        let expected = [("a", 1, Kind::Box3d, 2.0), ("b", 1, Kind::Rapier, 0.5), ("b", 2, Kind::Rapier, 2.0 / 3.0)];
         assert_eq!(seen, expected);
         let means = geometric_means(&ratios);
-        assert!((means[&1] - 1.0).abs() < 1e-12 && (means[&2] - 1.5).abs() < 1e-12);
+        assert!((means[&1] - 1.0).abs() < 1e-12 && (means[&2] - 2.0 / 3.0).abs() < 1e-12);
         let worst = worst(&ratios).unwrap();
         assert_eq!((&worst.scene[..], worst.threads), ("b", 1));
     }

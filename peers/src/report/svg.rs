@@ -98,7 +98,7 @@ fn heading(svg: &mut String, left: f64, threads: usize, rows: &[Row], bottom: f6
     let plural = if threads == 1 { "" } else { "s" };
     text(svg, [left + LABEL, 62.0], "start", 600, &format!("{threads} thread{plural}"));
     if let Some(mean) = geometric_means(&ratios(rows)).get(&threads) {
-        text(svg, [left + PANEL, 62.0], "end", 600, &format!("geometric mean {mean:.2}"));
+        text(svg, [left + PANEL, 62.0], "end", 600, &format!("{mean:.2} × as fast, geometric mean"));
     }
     let x = left + LABEL + UNIT * CHART;
     let _ = writeln!(
@@ -126,7 +126,7 @@ fn row(svg: &mut String, corner: [f64; 2], rows: &[&Row]) {
         bar(svg, [left, y], share, color(row.engine), row.failure.is_some());
         text(svg, [left - 5.0, y + 8.0], "end", 400, &short(row.median()));
         if let (Kind::Arbiter, Some(fastest), None) = (row.engine, fastest, &row.failure) {
-            let ratio = format!("{:.2} ×", row.median() / fastest);
+            let ratio = format!("{:.2} ×", fastest / row.median());
             text(svg, [left + CHART + RATIO, y + 8.0], "end", 600, &ratio);
         }
     }

@@ -1,7 +1,7 @@
 //! The results for people: one aligned line for each scene, engine and number of threads.
 //!
 //! `ms/step` is the median over the repetitions of the mean step, `min` the least of them, `floor` the mean over the steps of
-//! the fastest time of each, `worst10%` the mean of the slowest tenth. `ratio` is ours over the fastest peer, which has a 1.
+//! the fastest time of each, `worst10%` the mean of the slowest tenth. `ratio` is the fastest peer's time over ours; that peer has a 1.
 //! `contacts` is the engine's own count (of points, of pairs, as it counts); `points`, `height` (mean, metres), `depth`
 //! (deepest penetration), `awake`, `drift` (sideways, metres) and `energy` are measured alike for all.
 
@@ -32,14 +32,14 @@ pub fn table(rows: &[Row]) -> String {
         let count = ratios.iter().filter(|ratio| ratio.threads == threads).count();
         let _ = writeln!(
             text,
-            "arbiter3d / fastest peer, {threads} thread{}: geometric mean {mean:.3} over {count} scenes",
+            "fastest peer ÷ arbiter3d, {threads} thread{}: geometric mean {mean:.3} over {count} scenes",
             if threads == 1 { "" } else { "s" }
         );
     }
     if let Some(worst) = worst(&ratios) {
         let _ = writeln!(
             text,
-            "worst scene: {} with {} thread{}, {:.2} × {}",
+            "worst scene: {} with {} thread{}, {:.2} times as fast as {}",
             worst.scene,
             worst.threads,
             if worst.threads == 1 { "" } else { "s" },
@@ -117,6 +117,6 @@ mod tests {
         assert_eq!(&ours[end - 5..end], "1.000", "{text}");
         assert!(text.contains("FAILED: fell"), "{text}");
         assert!(text.contains("1 thread: geometric mean 1.000 over 2 scenes"), "{text}");
-        assert!(text.contains("worst scene: b with 1 thread, 2.00 × rapier"), "{text}");
+        assert!(text.contains("worst scene: b with 1 thread, 0.50 times as fast as rapier"), "{text}");
     }
 }

@@ -156,6 +156,16 @@ impl<const L: usize> Lanes<L> for Wide<L> {
     }
 
     #[inline(always)]
+    fn get(&self, lane: usize) -> f32 {
+        self.0[lane]
+    }
+
+    #[inline(always)]
+    fn set(&mut self, lane: usize, x: f32) {
+        self.0[lane] = x;
+    }
+
+    #[inline(always)]
     fn load(records: &[&Quad; L]) -> [Self; 4] {
         let mut columns = [Self::ZERO; 4];
         for (lane, record) in records.iter().enumerate() {

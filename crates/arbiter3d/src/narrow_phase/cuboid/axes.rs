@@ -51,7 +51,7 @@ impl<const L: usize> Axes<L> {
 }
 
 /// One lane of [`Axes`], of boxes that are not apart.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Near {
     face: Real,
     face_gap: Real,

@@ -15,11 +15,15 @@ use crate::narrow_phase::{CuboidAxes, CuboidLanes, Manifold, NearCuboids, collid
 use crate::parallel::{BlockList, SharedSlice};
 use crate::shape::Shape;
 use crate::simd::{Kernel, Number, Wide, WidePose, WideRotation, prefetch};
+use std::mem::MaybeUninit;
 
 /// Words of the active set in a block.
 pub(super) const WORDS_PER_BLOCK: usize = 2;
 /// Pairs in a block.
 pub(super) const PAIRS_PER_BLOCK: usize = 64 * WORDS_PER_BLOCK;
+
+/// How far ahead of its use a pair is asked for: also those of the next block, which is mostly the same thread's.
+const PAIRS_AHEAD: usize = 24;
 
 /// The active pairs of one block and their arbiters.
 pub(super) struct BlockPairs<'a> {
@@ -59,24 +63,29 @@ impl<'a> BlockPairs<'a> {
 }
 
 /// A list with room for the pairs of a block.
+///
+/// Left blank at first: filling the lists of a block would cost as much as looking at the pairs of one that rests.
 struct Queue<T> {
-    items: [T; PAIRS_PER_BLOCK],
+    items: [MaybeUninit<T>; PAIRS_PER_BLOCK],
     count: usize,
 }
 
 impl<T: Copy> Queue<T> {
-    fn new(empty: T) -> Self {
-        Self { items: [empty; PAIRS_PER_BLOCK], count: 0 }
+    #[inline(always)]
+    fn new() -> Self {
+        Self { items: [const { MaybeUninit::uninit() }; PAIRS_PER_BLOCK], count: 0 }
     }
 
     #[inline(always)]
     fn push(&mut self, item: T) {
-        self.items[self.count] = item;
+        self.items[self.count] = MaybeUninit::new(item);
         self.count += 1;
     }
 
+    #[inline(always)]
     fn items(&self) -> &[T] {
-        &self.items[..self.count]
+        // SAFETY: `push` has written the first `count`, and `MaybeUninit<T>` lies in memory as `T` does.
+        unsafe { std::slice::from_raw_parts(self.items.as_ptr().cast(), self.count) }
     }
 }
 
@@ -86,10 +95,6 @@ struct Fresh {
     pair: u32,
     /// Centre frame of body 2 seen from that of body 1.
     between: Pose,
-}
-
-impl Fresh {
-    const NONE: Self = Self { pair: NONE, between: Pose::IDENTITY };
 }
 
 /// The work on one block, `L` pairs at a time.
@@ -104,12 +109,16 @@ impl<const L: usize> Kernel for BlockKernel<'_, L> {
     #[inline(always)]
     fn run(mut self) {
         let near = self.drop_parted();
-        let mut fresh = Queue::new(Fresh::NONE);
+        let mut fresh = Queue::new();
         for chunk in near.items().chunks(L) {
             self.keep_manifolds(chunk, &mut fresh);
         }
-        self.collide_cuboids(&mut fresh);
+        let (mut cuboids, mut others) = (Queue::new(), Queue::new());
         for item in fresh.items() {
+            if self.is_of_cuboids(item) { cuboids.push(*item) } else { others.push(*item) }
+        }
+        self.collide_cuboids(cuboids.items());
+        for item in others.items() {
             self.collide_anew(item);
         }
     }
@@ -119,12 +128,13 @@ impl<const L: usize> BlockKernel<'_, L> {
     /// The pairs whose fat boxes still overlap; the others are reported.
     #[inline(always)]
     fn drop_parted(&mut self) -> Queue<u32> {
-        let mut near = Queue::new(0);
+        let mut near = Queue::new();
         for (word, &bits) in self.pairs.words.iter().enumerate() {
             let mut bits = bits;
             while bits != 0 {
                 let index = (self.pairs.first + word * 64) as u32 + bits.trailing_zeros();
                 bits &= bits - 1;
+                self.pairs.pairs.prefetch(index as usize + PAIRS_AHEAD);
                 let pair = self.pairs.pair(index);
                 if pair.shapes.iter().any(|&slot| self.context.moved[slot as usize])
                     && !self.context.boxes_overlap(pair)
@@ -201,12 +211,11 @@ impl<const L: usize> BlockKernel<'_, L> {
         }
     }
 
-    /// Makes new manifolds of pairs of cuboids, and leaves the other pairs in the list.
+    /// Makes new manifolds of pairs of cuboids.
     #[inline(always)]
-    fn collide_cuboids(&mut self, fresh: &mut Queue<Fresh>) {
-        let cuboids = self.take_cuboids(fresh);
-        let mut near = Queue::new((Fresh::NONE, NearCuboids::default()));
-        for chunk in cuboids.items().chunks(L) {
+    fn collide_cuboids(&mut self, cuboids: &[Fresh]) {
+        let mut near = Queue::new();
+        for chunk in cuboids.chunks(L) {
             self.test_axes(chunk, &mut near);
         }
         for chunk in near.items().chunks(L) {
@@ -214,24 +223,12 @@ impl<const L: usize> BlockKernel<'_, L> {
         }
     }
 
-    /// Moves the pairs of cuboids from the list to one of their own, unless a filter has to see each manifold by itself.
+    /// Whether the cuboid kernel may take a pair: a filter has to see each manifold by itself.
     #[inline(always)]
-    fn take_cuboids(&mut self, fresh: &mut Queue<Fresh>) -> Queue<Fresh> {
-        let mut cuboids = Queue::new(Fresh::NONE);
-        let mut others = 0;
-        for at in 0..fresh.count {
-            let item = fresh.items[at];
-            let (context, pair) = (self.context, self.pairs.pair(item.pair));
-            let boxes = pair.shapes.map(|slot| matches!(context.shapes[slot as usize].geometry, Shape::Cuboid(_)));
-            if boxes[0] & boxes[1] && !pair.sensor && context.filters.contact.is_none() {
-                cuboids.push(item);
-            } else {
-                fresh.items[others] = item;
-                others += 1;
-            }
-        }
-        fresh.count = others;
-        cuboids
+    fn is_of_cuboids(&mut self, item: &Fresh) -> bool {
+        let (context, pair) = (self.context, self.pairs.pair(item.pair));
+        let boxes = pair.shapes.map(|slot| matches!(context.shapes[slot as usize].geometry, Shape::Cuboid(_)));
+        boxes[0] & boxes[1] && !pair.sensor && context.filters.contact.is_none()
     }
 
     #[inline(always)]
