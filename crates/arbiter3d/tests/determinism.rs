@@ -20,12 +20,12 @@ use common::*;
 
 /// The hashes of the scenes, in their order.
 const GOLDEN: [(&str, u64); 6] = [
-    ("pile", 0x5605_7fa2_3f5c_22c0),
-    ("hulls", 0x7823_409e_95e7_9848),
-    ("mesh rain", 0x636d_75c3_adc3_dafb),
-    ("bullets", 0xa21e_9fab_a22d_148e),
-    ("custom contacts", 0x1faa_3f4c_4ab4_0de6),
-    ("coming and going", 0xb256_8562_3c92_1ee7),
+    ("pile", 0xf7e2_7bbe_2c44_4988),
+    ("hulls", 0x617d_08f7_41ca_77b3),
+    ("mesh rain", 0x6bc5_6b01_56e0_f939),
+    ("bullets", 0x3cf5_7922_ef14_4a99),
+    ("custom contacts", 0xc12c_c4b6_3d57_60df),
+    ("coming and going", 0x71d5_545e_6340_5cef),
 ];
 
 /// A scene: how it begins, and what is done before each step.

@@ -53,6 +53,12 @@ impl Default for BodyState {
 }
 
 impl BodyState {
+    /// Whether nothing moves the body and it does not move by itself.
+    #[inline(always)]
+    pub fn is_fixed(&self) -> bool {
+        self.moves == 0 && self.linear_velocity == Vec3::ZERO && self.angular_velocity == Vec3::ZERO
+    }
+
     /// The record as groups of four numbers, the first three of which are its twelve.
     #[inline(always)]
     pub fn quads(&self) -> &[Quad; 4] {

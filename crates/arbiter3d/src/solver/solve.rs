@@ -1,14 +1,8 @@
 //! The passes over wide rows: warm start, solve, relax, restitution.
 //!
-//! *Solve* pushes overlaps apart: with separation `s`, a point wants the normal velocity `−s/t` while it is apart (it may
+//! *Solve* pushes overlaps apart: with separation `s`, a point wants the normal velocity `−s/h` while it is apart (it may
 //! close the gap but not cross it), and behaves as a spring and damper where it overlaps. *Relax*, after the positions have
 //! moved, takes out the velocity that the spring has put in, and solves friction. Restitution comes last, once a step.
-//!
-//! The time `t` to close a gap in is the rest of the step, not the substep, so that all that hits within a step hits
-//! together. A falling trunk that hit at its middle in one substep and at its tip in the next would be thrown up by a sequence
-//! of blows, none of which bounces: its middle stops, its foot flies up, the blow to its tip lifts the rest (measured: 1.4 m).
-//! Nothing else is slowed down: a point that closes more slowly than `s/t` would not have hit. What bounces has only the
-//! substep: it has to leave from the surface, at the time at which it hits.
 //!
 //! Softness, with `ω = 2π·hertz`, damping ratio `ζ` and substep `h`:
 //!
@@ -55,10 +49,7 @@ impl Softness {
 /// What the passes of a substep share.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PassParameters {
-    /// One over the time in which a gap may close, the rest of the step.
-    pub closing_rate: Real,
-    /// The same of what bounces: one over the substep.
-    pub bouncing_rate: Real,
+    pub inverse_substep: Real,
     pub push_out_speed: Real,
     /// Overlap past which a contact at rest gives no further, m: its spring is as much stiffer as its load asks for.
     pub deepest_rest: Real,
@@ -239,25 +230,13 @@ impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> RowPass<'_, W,
         separations
     }
 
-    /// One over the time in which each lane's gaps may close: the rest of the step, but the substep where something bounces.
-    #[inline(always)]
-    fn closing_rate(&self, pass: &PassParameters) -> W {
-        let rate = W::splat(pass.closing_rate);
-        match &self.extra {
-            Some(extra) if self.features.restitution => {
-                extra.restitution.if_positive(W::splat(pass.bouncing_rate), rate)
-            }
-            _ => rate,
-        }
-    }
-
     /// One Gauss–Seidel sweep over the points of a row.
     #[inline(always)]
     fn solve_normals<const BIAS: bool>(&mut self, sides: &mut Sides<W>, pass: &PassParameters) {
         let separations = self.separations(sides);
         let mut velocities = self.normal_velocities(sides);
-        let closing_rate = self.closing_rate(pass);
         let row = &mut *self.row;
+        let inverse_substep = W::splat(pass.inverse_substep);
         let rate = W::splat(pass.softness.mass_scale * pass.softness.bias_rate);
         let (soft, one) = (W::splat(pass.softness.mass_scale), W::splat(1.0));
         let leak = W::splat(pass.softness.impulse_scale);
@@ -269,12 +248,12 @@ impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> RowPass<'_, W,
             let s = separations[i];
             let old = row.impulses[i];
             let change = if BIAS {
-                let bias = s.if_positive(s * closing_rate, (s * rate).max(limit));
+                let bias = s.if_positive(s * inverse_substep, (s * rate).max(limit));
                 let scale = s.if_positive(one, soft);
                 let leak = s.if_positive(W::ZERO, leak);
                 row.points[i].mass * (scale * velocities[i] + bias) + (leak * old).min(row.points[i].mass * firmest)
             } else {
-                row.points[i].mass * (velocities[i] + s.max(W::ZERO) * closing_rate)
+                row.points[i].mass * (velocities[i] + s.max(W::ZERO) * inverse_substep)
             };
             let new = (old - change).max(W::ZERO);
             let delta = new - old;

@@ -276,16 +276,15 @@ impl World {
         let substep = dt / settings.substeps as Real;
         let hertz = min(settings.contact_hertz, MAX_CONTACT_RATE / substep);
         let pass = |softness: Softness| PassParameters {
-            closing_rate: 1.0 / dt,
-            bouncing_rate: 1.0 / substep,
+            inverse_substep: 1.0 / substep,
             push_out_speed: settings.push_out_speed,
             deepest_rest: if settings.slop > 0.0 { DEEPEST_REST * settings.slop } else { 1e6 },
             softness,
             restitution_threshold: settings.restitution_threshold,
         };
         // Against the ground twice as stiff: what stands on it has the weight of all above.
-        let mut soft = pass(Softness::new(hertz, settings.contact_damping_ratio, substep));
-        let mut stiff = pass(Softness::new(2.0 * hertz, 0.5 * settings.contact_damping_ratio, substep));
+        let soft = pass(Softness::new(hertz, settings.contact_damping_ratio, substep));
+        let stiff = pass(Softness::new(2.0 * hertz, 0.5 * settings.contact_damping_ratio, substep));
         let integrate = IntegrateParameters {
             substep,
             max_linear_speed: settings.max_linear_speed,
@@ -293,9 +292,6 @@ impl World {
         };
         for index in 0..settings.substeps {
             let first = index == 0;
-            // What is apart has the rest of the step to come together: see `solver::solve`.
-            let closing_rate = 1.0 / ((settings.substeps - index) as Real * substep);
-            (soft.closing_rate, stiff.closing_rate) = (closing_rate, closing_rate);
             self.integrate(if first { Integration::FirstVelocities } else { Integration::Velocities }, &integrate);
             if first {
                 self.run_pass(Pass::WarmStart, &soft, &stiff);
