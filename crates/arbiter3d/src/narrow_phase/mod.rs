@@ -28,7 +28,7 @@ mod triangle;
 mod triangle_lanes;
 mod triangle_solid;
 
-pub(crate) use cuboid::{Axes as CuboidAxes, CuboidLanes, Near as NearCuboids, WideManifold};
+pub(crate) use cuboid::{CuboidLanes, CuboidPair, Near as NearCuboids, WideManifold};
 pub(crate) use distance::Support;
 pub(crate) use time_of_impact::{Sweep, gap, time_of_impact};
 

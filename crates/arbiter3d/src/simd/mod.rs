@@ -11,7 +11,7 @@ mod wide;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
-pub(crate) use pose::{WidePose, WideRotation, WideVec3};
+pub(crate) use pose::LanePose;
 pub(crate) use vector::{LaneRotation, LaneSymmetric, LaneVec3};
 pub(crate) use wide::{Lanes, Number, Quad, Wide};
 #[cfg(target_arch = "x86_64")]

@@ -1,107 +1,25 @@
-//! Lanes of rotations and poses, each lane with the operations and their order of [`Rotation`] and [`Pose`].
+//! Lanes of rotations and poses, each lane with the operations and their order of [`crate::math::Rotation`] and
+//! [`crate::math::Pose`].
 
-use super::{LaneVec3, Number, Wide};
-use crate::math::{Pose, Rotation};
+use super::{LaneRotation, LaneVec3, Lanes, Number, Quad};
 
-/// `L` vectors side by side.
-pub(crate) type WideVec3<const L: usize> = LaneVec3<Wide<L>>;
-
-/// `L` unit quaternions side by side.
+/// Poses side by side.
 #[derive(Clone, Copy, Debug)]
-#[repr(C)]
-pub(crate) struct WideRotation<const L: usize> {
-    pub x: Wide<L>,
-    pub y: Wide<L>,
-    pub z: Wide<L>,
-    pub w: Wide<L>,
+pub(crate) struct LanePose<W> {
+    pub rotation: LaneRotation<W>,
+    pub position: LaneVec3<W>,
 }
 
-impl<const L: usize> WideRotation<L> {
-    pub const ZERO: Self = Self { x: Wide::ZERO, y: Wide::ZERO, z: Wide::ZERO, w: Wide::ZERO };
-
+impl<W: Number> LanePose<W> {
+    /// From records whose first seven numbers are position and rotation.
     #[inline(always)]
-    pub fn set(&mut self, lane: usize, q: Rotation) {
-        self.x[lane] = q.x;
-        self.y[lane] = q.y;
-        self.z[lane] = q.z;
-        self.w[lane] = q.w;
-    }
-
-    #[inline(always)]
-    pub fn get(&self, lane: usize) -> Rotation {
-        Rotation::from_xyzw(self.x[lane], self.y[lane], self.z[lane], self.w[lane])
-    }
-
-    #[inline(always)]
-    pub fn vector(&self) -> WideVec3<L> {
-        WideVec3 { x: self.x, y: self.y, z: self.z }
-    }
-
-    #[inline(always)]
-    pub fn conjugate(&self) -> Self {
-        Self { x: -self.x, y: -self.y, z: -self.z, w: self.w }
-    }
-
-    #[inline(always)]
-    pub fn mul(&self, b: &Self) -> Self {
-        let a = self;
-        Self {
-            x: a.w * b.x + a.x * b.w + a.y * b.z - a.z * b.y,
-            y: a.w * b.y - a.x * b.z + a.y * b.w + a.z * b.x,
-            z: a.w * b.z + a.x * b.y - a.y * b.x + a.z * b.w,
-            w: a.w * b.w - a.x * b.x - a.y * b.y - a.z * b.z,
-        }
-    }
-
-    #[inline(always)]
-    pub fn rotate(&self, v: &WideVec3<L>) -> WideVec3<L> {
-        let u = self.vector();
-        let t = u.cross(v).scale(Wide::splat(2.0));
-        *v + t.scale(self.w) + u.cross(&t)
-    }
-
-    #[inline(always)]
-    pub fn inverse_rotate(&self, v: &WideVec3<L>) -> WideVec3<L> {
-        self.conjugate().rotate(v)
-    }
-
-    /// The turned axes.
-    #[inline(always)]
-    pub fn axes(&self) -> [WideVec3<L>; 3] {
-        let (x, y, z, w) = (self.x, self.y, self.z, self.w);
-        let (x2, y2, z2) = (x + x, y + y, z + z);
-        let (xx, xy, xz) = (x * x2, x * y2, x * z2);
-        let (yy, yz, zz) = (y * y2, y * z2, z * z2);
-        let (wx, wy, wz) = (w * x2, w * y2, w * z2);
-        let one = Wide::splat(1.0);
-        [
-            WideVec3 { x: one - (yy + zz), y: xy + wz, z: xz - wy },
-            WideVec3 { x: xy - wz, y: one - (xx + zz), z: yz + wx },
-            WideVec3 { x: xz + wy, y: yz - wx, z: one - (xx + yy) },
-        ]
-    }
-}
-
-/// `L` poses side by side.
-#[derive(Clone, Copy, Debug)]
-#[repr(C)]
-pub(crate) struct WidePose<const L: usize> {
-    pub rotation: WideRotation<L>,
-    pub position: WideVec3<L>,
-}
-
-impl<const L: usize> WidePose<L> {
-    pub const ZERO: Self = Self { rotation: WideRotation::ZERO, position: WideVec3::ZERO };
-
-    #[inline(always)]
-    pub fn set(&mut self, lane: usize, pose: &Pose) {
-        self.rotation.set(lane, pose.rotation);
-        self.position.set(lane, pose.position);
-    }
-
-    #[inline(always)]
-    pub fn get(&self, lane: usize) -> Pose {
-        Pose::new(self.position.get(lane), self.rotation.get(lane))
+    pub fn load<const N: usize, const L: usize>(records: &[&[Quad; N]; L]) -> Self
+    where
+        W: Lanes<L>,
+    {
+        let [x, y, z, qx] = W::load_quad(records, 0);
+        let [qy, qz, w, _] = W::load_quad(records, 1);
+        Self { rotation: LaneRotation { vector: LaneVec3 { x: qx, y: qy, z: qz }, w }, position: LaneVec3 { x, y, z } }
     }
 
     /// The poses of `other` seen from these frames.
@@ -117,7 +35,18 @@ impl<const L: usize> WidePose<L> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::Vec3;
+    use crate::math::{Pose, Rotation, Vec3};
+    use crate::simd::Wide;
+
+    fn record(pose: &Pose) -> [Quad; 2] {
+        let (p, q) = (pose.position, pose.rotation);
+        [[p.x, p.y, p.z, q.x], [q.y, q.z, q.w, 0.0]]
+    }
+
+    fn rotation_of(q: &LaneRotation<Wide<8>>, lane: usize) -> Rotation {
+        let v = q.vector.get(lane);
+        Rotation::from_xyzw(v.x, v.y, v.z, q.w[lane])
+    }
 
     /// What lanes compute is what one pose computes, bit for bit.
     #[test]
@@ -126,16 +55,16 @@ mod tests {
             let s = 0.37 * i as f32;
             Pose::new(Vec3::new(s, 1.0 - s, 0.3 * s), Rotation::from_xyzw(s, 0.4, -0.2 * s, 1.0).normalize())
         };
-        let (mut a, mut b) = (WidePose::<8>::ZERO, WidePose::<8>::ZERO);
-        for lane in 0..8 {
-            a.set(lane, &pose(lane));
-            b.set(lane, &pose(lane * 3 + 1));
-        }
+        let first: [[Quad; 2]; 8] = std::array::from_fn(|lane| record(&pose(lane)));
+        let second: [[Quad; 2]; 8] = std::array::from_fn(|lane| record(&pose(lane * 3 + 1)));
+        let a = LanePose::<Wide<8>>::load(&first.each_ref());
+        let b = LanePose::<Wide<8>>::load(&second.each_ref());
         let (relative, axes) = (a.relative(&b), a.rotation.axes());
         let turned = a.rotation.rotate(&b.position);
         for lane in 0..8 {
             let (a, b) = (pose(lane), pose(lane * 3 + 1));
-            assert_eq!(relative.get(lane), a.relative(&b));
+            let found = Pose::new(relative.position.get(lane), rotation_of(&relative.rotation, lane));
+            assert_eq!(found, a.relative(&b));
             assert_eq!(turned.get(lane), a.rotation.rotate(b.position));
             let m = a.rotation.to_mat3();
             assert_eq!([m.x_axis, m.y_axis, m.z_axis], [axes[0].get(lane), axes[1].get(lane), axes[2].get(lane)]);

@@ -82,6 +82,15 @@ impl<const L: usize> LaneVec3<Wide<L>> {
 
 /// Access to single lanes.
 impl<W> LaneVec3<W> {
+    /// The same numbers in plain arrays, whose lanes can be read and written one by one.
+    #[inline(always)]
+    pub fn to_wide<const L: usize>(self) -> LaneVec3<Wide<L>>
+    where
+        W: Lanes<L>,
+    {
+        LaneVec3 { x: Wide(self.x.to_array()), y: Wide(self.y.to_array()), z: Wide(self.z.to_array()) }
+    }
+
     #[inline(always)]
     pub fn set<const L: usize>(&mut self, lane: usize, v: Vec3)
     where
@@ -135,8 +144,43 @@ impl<W: Number> LaneRotation<W> {
     /// [`crate::math::Rotation::inverse_rotate`] in lanes.
     #[inline(always)]
     pub fn inverse_rotate(&self, v: &LaneVec3<W>) -> LaneVec3<W> {
-        let u = LaneVec3 { x: -self.vector.x, y: -self.vector.y, z: -self.vector.z };
-        Self { vector: u, w: self.w }.rotate(v)
+        self.conjugate().rotate(v)
+    }
+
+    /// [`crate::math::Rotation::conjugate`] in lanes.
+    #[inline(always)]
+    pub fn conjugate(&self) -> Self {
+        Self { vector: LaneVec3 { x: -self.vector.x, y: -self.vector.y, z: -self.vector.z }, w: self.w }
+    }
+
+    /// [`crate::math::Rotation::mul`] in lanes.
+    #[inline(always)]
+    pub fn mul(&self, other: &Self) -> Self {
+        let (a, b, aw, bw) = (&self.vector, &other.vector, self.w, other.w);
+        Self {
+            vector: LaneVec3 {
+                x: aw * b.x + a.x * bw + a.y * b.z - a.z * b.y,
+                y: aw * b.y - a.x * b.z + a.y * bw + a.z * b.x,
+                z: aw * b.z + a.x * b.y - a.y * b.x + a.z * bw,
+            },
+            w: aw * bw - a.x * b.x - a.y * b.y - a.z * b.z,
+        }
+    }
+
+    /// The turned axes: the columns of [`crate::math::Rotation::to_mat3`].
+    #[inline(always)]
+    pub fn axes(&self) -> [LaneVec3<W>; 3] {
+        let (LaneVec3 { x, y, z }, w) = (self.vector, self.w);
+        let (x2, y2, z2) = (x + x, y + y, z + z);
+        let (xx, xy, xz) = (x * x2, x * y2, x * z2);
+        let (yy, yz, zz) = (y * y2, y * z2, z * z2);
+        let (wx, wy, wz) = (w * x2, w * y2, w * z2);
+        let one = W::splat(1.0);
+        [
+            LaneVec3 { x: one - (yy + zz), y: xy + wz, z: xz - wy },
+            LaneVec3 { x: xy - wz, y: one - (xx + zz), z: yz + wx },
+            LaneVec3 { x: xz + wy, y: yz - wx, z: one - (xx + yy) },
+        ]
     }
 
     /// [`crate::math::Rotation::integrate`] in lanes.

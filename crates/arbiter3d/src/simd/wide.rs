@@ -70,6 +70,9 @@ pub(crate) trait Lanes<const L: usize>: Number {
     /// The records that have these columns: undoes [`Lanes::load`].
     fn store(columns: &[Self; 4]) -> [Quad; L];
 
+    /// A bit for each lane that is positive, lane 0 in the lowest.
+    fn positive(self) -> u32;
+
     /// One lane.
     #[inline(always)]
     fn get(&self, lane: usize) -> f32 {
@@ -153,6 +156,15 @@ impl<const L: usize> Lanes<L> for Wide<L> {
     #[inline(always)]
     fn to_array(self) -> [f32; L] {
         self.0
+    }
+
+    #[inline(always)]
+    fn positive(self) -> u32 {
+        let mut bits = 0;
+        for (lane, &x) in self.0.iter().enumerate() {
+            bits |= u32::from(x > 0.0) << lane;
+        }
+        bits
     }
 
     #[inline(always)]

@@ -185,6 +185,12 @@ impl Lanes<4> for Sse2Lanes {
     }
 
     #[inline(always)]
+    fn positive(self) -> u32 {
+        // SAFETY: see the module: the machine has the instructions.
+        unsafe { _mm_movemask_ps(_mm_cmplt_ps(_mm_setzero_ps(), self.0)) as u32 }
+    }
+
+    #[inline(always)]
     fn load(records: &[&Quad; 4]) -> [Self; 4] {
         // SAFETY: SSE2 is in every x86-64.
         unsafe {
@@ -219,6 +225,12 @@ impl Lanes<8> for Avx2Lanes {
     fn to_array(self) -> [f32; 8] {
         // SAFETY: the register is as many floats.
         unsafe { std::mem::transmute::<__m256, [f32; 8]>(self.0) }
+    }
+
+    #[inline(always)]
+    fn positive(self) -> u32 {
+        // SAFETY: see the module: the machine has the instructions.
+        unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_GT_OQ>(self.0, _mm256_setzero_ps())) as u32 }
     }
 
     #[inline(always)]
@@ -275,6 +287,12 @@ impl Lanes<16> for Avx512Lanes {
     fn to_array(self) -> [f32; 16] {
         // SAFETY: the register is as many floats.
         unsafe { std::mem::transmute::<__m512, [f32; 16]>(self.0) }
+    }
+
+    #[inline(always)]
+    fn positive(self) -> u32 {
+        // SAFETY: see the module: the machine has the instructions.
+        unsafe { u32::from(_mm512_cmp_ps_mask::<_CMP_GT_OQ>(self.0, _mm512_setzero_ps())) }
     }
 
     #[inline(always)]

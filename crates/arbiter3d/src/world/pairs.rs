@@ -10,6 +10,7 @@ use super::definition::BodyKind;
 use crate::arbiter::{EndReason, NONE};
 use crate::math::{Pose, Real, Rotation, Vec3, max, min};
 use crate::narrow_phase::PairCache;
+use crate::simd::Quad;
 use crate::storage;
 
 /// What the world keeps of a pair. Shape 1 has the smaller id.
@@ -52,6 +53,14 @@ pub(super) const REUSE_ROTATION: Real = 0.0125;
 const REUSE_REACH: Real = 0.08;
 
 impl Pair {
+    /// The first eleven of twelve numbers: rotation and position of `manifold_pose`, then `manifold_rotation`.
+    #[inline(always)]
+    pub fn quads(&self) -> &[Quad; 3] {
+        const { assert!(std::mem::offset_of!(Self, bodies) + size_of::<u32>() == size_of::<[Quad; 3]>()) };
+        // SAFETY: `repr(C)`; eleven floats, and the place of a body, whose bits are those of some float.
+        unsafe { &*std::ptr::from_ref(self).cast() }
+    }
+
     /// How far (metres, sine of half the angle) the bodies may move against each other before their shapes are looked at
     /// again.
     ///

@@ -1,249 +1,331 @@
 //! One face clipped against another, for `L` pairs of cuboids side by side.
 //!
 //! Which box has the reference face, which of its faces that is, and which face of the other looks against it differ from lane
-//! to lane: rows, columns and roles are put in order by selects first, and from there on all lanes do the same.
+//! to lane: rows, columns and roles are put in order by selects first, and from there on all lanes do the same. Only the choice
+//! among more than four corners is made lane by lane.
 
 use super::super::clip::choose_four;
 use super::axes::{Columns, pick_column};
-use super::lanes::{CuboidLanes, Pick, WideManifold};
+use super::lanes::{CuboidLanes, WideManifold, pick};
 use super::{GROWTH, SIGNS};
 use crate::math::Real;
-use crate::simd::{Number, Wide, WideVec3};
+use crate::simd::{LaneVec3, Lanes, Number};
 
 /// Candidates for corners of a clipped face: the two ends of each of four sides, and the four corners of the rectangle.
 const CANDIDATES: usize = 12;
 
-/// Name of each candidate: which side, and which end of it; or which corner of the rectangle.
-const NAMES: [[u32; 3]; 4] = [[0, 2, 16], [4, 6, 20], [8, 10, 24], [12, 14, 28]];
+/// Name of each candidate: which side, and which end of it; or which corner of the rectangle. The first end of a side that is
+/// cut off has the next number.
+const NAMES: [u32; CANDIDATES] = [0, 2, 4, 6, 8, 10, 12, 14, 16, 20, 24, 28];
 
 /// Reference faces, each in the frame of its own box, and the faces of the other boxes that look most against them.
-struct FacePairs<const L: usize> {
+struct FacePairs<W> {
+    /// Positive where the reference face is on box 2.
+    swap: W,
     /// Axis of the reference face.
-    k: Pick<L>,
+    k: W,
     /// Which of the two faces on that axis.
-    sign: Wide<L>,
+    sign: W,
     /// Offset of the reference plane along the signed axis.
-    offset: Wide<L>,
+    offset: W,
     /// Half extents of the reference rectangle, grown.
-    rectangle: [Wide<L>; 2],
+    rectangle: [W; 2],
     /// Centre of the incident face: two coordinates in the rectangle, then the height over it.
-    center: [Wide<L>; 3],
+    center: [W; 3],
     /// From the centre of the incident face to the middles of two neighbouring sides.
-    p: [Wide<L>; 3],
-    q: [Wide<L>; 3],
+    p: [W; 3],
+    q: [W; 3],
     /// Axis of the incident face, and which way it looks along it.
-    j: Wide<L>,
-    towards: Wide<L>,
+    j: W,
+    towards: W,
 }
 
-/// Corners of clipped faces: coordinates in the reference rectangle, height over it, and a bit for each that counts.
+/// Corners of clipped faces: coordinates in the reference rectangle and height over it. In plain arrays, since corners are
+/// chosen lane by lane.
 struct Patches<const L: usize> {
-    x: [Wide<L>; CANDIDATES],
-    y: [Wide<L>; CANDIDATES],
-    height: [Wide<L>; CANDIDATES],
-    present: [u32; L],
-    /// Among the lower eight bits of a name: the end of a side that is cut off.
-    names: [[u32; L]; CANDIDATES],
+    x: [[Real; L]; CANDIDATES],
+    y: [[Real; L]; CANDIDATES],
+    height: [[Real; L]; CANDIDATES],
+    /// Sum of `2^candidate` over those that count.
+    present: [Real; L],
+    /// Sum of `2^candidate` over ends that are cut off.
+    cut: [Real; L],
+    /// What the two faces give to the names of corners.
+    faces: [Real; L],
 }
 
-impl<const L: usize> CuboidLanes<L> {
+impl<W: Number> CuboidLanes<W> {
     /// Clips the incident face against the reference face `axis`, 0 to 5.
     #[inline(always)]
-    pub(super) fn face_contacts(&self, axis: &Wide<L>, count: usize) -> WideManifold<L> {
+    pub(super) fn face_contacts<const L: usize>(&self, axis: W, count: usize) -> WideManifold<L>
+    where
+        W: Lanes<L>,
+    {
         let c = self.pose.rotation.axes();
-        let swap = axis.if_above(Wide::splat(2.5), Wide::splat(1.0), Wide::ZERO);
-        let k = Pick(swap.if_positive(*axis - Wide::splat(3.0), *axis));
-        let pairs = FacePairs::new(self, &c, swap, k);
-        let patches = pairs.clip(self.margin);
+        let pairs = FacePairs::new(self, &c, axis);
+        let patches = pairs.clip::<L>(self.margin);
+        let size = self.size.to_array();
         let mut manifold = WideManifold::EMPTY;
-        let (mut x, mut y) = ([Wide::<L>::ZERO; 4], [Wide::<L>::ZERO; 4]);
+        let (mut x, mut y) = ([[0.0; L]; 4], [[0.0; L]; 4]);
         for lane in 0..count.min(L) {
-            let base = pairs.feature(lane) | if swap[lane] > 0.0 { 0x1000 } else { 0 };
-            let (chosen, points) = patches.choose(lane, self.size[lane]);
+            let base = patches.faces[lane] as u32;
+            let cut = patches.cut[lane] as u32;
+            let (chosen, points) = patches.choose(lane, size[lane]);
             manifold.count[lane] = points as u32;
             for (i, &candidate) in chosen.iter().enumerate().take(points) {
                 x[i][lane] = patches.x[candidate][lane];
                 y[i][lane] = patches.y[candidate][lane];
                 manifold.separation[i][lane] = patches.height[candidate][lane];
-                manifold.feature[i][lane] = base | patches.names[candidate][lane];
+                manifold.feature[i][lane] = base | NAMES[candidate] | (cut >> candidate & 1);
             }
         }
-        pairs.place(self, &c, swap, (&x, &y), &mut manifold);
+        pairs.place(self, &c, (&x, &y), &mut manifold);
         manifold
     }
 }
 
-impl<const L: usize> FacePairs<L> {
+/// `second` where `swap` is positive, else `first`.
+#[inline(always)]
+fn role<W: Number>(swap: W, first: [W; 3], second: [W; 3]) -> [W; 3] {
+    [
+        swap.if_positive(second[0], first[0]),
+        swap.if_positive(second[1], first[1]),
+        swap.if_positive(second[2], first[2]),
+    ]
+}
+
+/// Coordinates in the order u, v, k.
+#[inline(always)]
+fn around<W: Number>(k: W, [x, y, z]: [W; 3]) -> [W; 3] {
+    [pick(k, [y, z, x]), pick(k, [z, x, y]), pick(k, [x, y, z])]
+}
+
+/// From the order u, v, k back to x, y, z.
+#[inline(always)]
+fn back<W: Number>(k: W, [a, b, c]: [W; 3]) -> LaneVec3<W> {
+    LaneVec3 { x: pick(k, [c, b, a]), y: pick(k, [a, c, b]), z: pick(k, [b, a, c]) }
+}
+
+/// One of the three vectors in each lane.
+#[inline(always)]
+fn pick_vector<W: Number>(which: W, [a, b, c]: [&[W; 3]; 3]) -> [W; 3] {
+    [pick(which, [a[0], b[0], c[0]]), pick(which, [a[1], b[1], c[1]]), pick(which, [a[2], b[2], c[2]])]
+}
+
+/// `v · scale`, the last coordinate along `sign`.
+#[inline(always)]
+fn scaled<W: Number>(v: [W; 3], scale: W, sign: W) -> [W; 3] {
+    [v[0] * scale, v[1] * scale, v[2] * scale * sign]
+}
+
+/// The axis of the incident face: the one that looks most along the normal. A face must do so clearly more to take over: a
+/// box at 45° keeps its incident face.
+#[inline(always)]
+fn steepest<W: Number>([x, y, z]: &[[W; 3]; 3]) -> W {
+    let (x, y, z) = (x[2].abs(), y[2].abs(), z[2].abs());
+    let clearly = W::splat(1e-3);
+    let floor = x + clearly;
+    let axis = y.if_above(floor, W::splat(1.0), W::ZERO);
+    let floor = y.if_above(floor, y + clearly, floor);
+    z.if_above(floor, W::splat(2.0), axis)
+}
+
+impl<W: Number> FacePairs<W> {
     #[inline(always)]
-    fn new(lanes: &CuboidLanes<L>, c: &Columns<L>, swap: Wide<L>, k: Pick<L>) -> Self {
-        let role = |first: Wide<L>, second: Wide<L>| swap.if_positive(second, first);
+    fn new(lanes: &CuboidLanes<W>, c: &Columns<W>, axis: W) -> Self {
+        let one = W::splat(1.0);
+        let swap = axis.if_above(W::splat(2.5), one, W::ZERO);
+        let k = swap.if_positive(axis - W::splat(3.0), axis);
         let (a, b, t) = (lanes.half1.columns(), lanes.half2.columns(), lanes.pose.position);
-        let half1: [Wide<L>; 3] = std::array::from_fn(|i| role(a[i], b[i]));
-        let half2: [Wide<L>; 3] = std::array::from_fn(|i| role(b[i], a[i]));
+        let (half1, half2) = (role(swap, a, b), role(swap, b, a));
         // Axis `j` of the incident box in the frame of the reference box, and its centre.
-        let column = c.each_ref().map(WideVec3::columns);
-        let turned: [[Wide<L>; 3]; 3] =
-            std::array::from_fn(|j| std::array::from_fn(|i| role(column[j][i], column[i][j])));
-        let ahead = t.columns();
-        let position: [Wide<L>; 3] = std::array::from_fn(|i| role(ahead[i], -c[i].dot(&t)));
-        // Rows in the order u, v, k.
-        let around = |v: &[Wide<L>; 3]| [k.of([v[1], v[2], v[0]]), k.of([v[2], v[0], v[1]]), k.of(*v)];
-        let axes = turned.each_ref().map(around);
-        let (half1, position) = (around(&half1), around(&position));
-        let one = Wide::splat(1.0);
-        let sign = Wide::ZERO.if_above(position[2], -one, one);
-        // A face must look along the normal clearly more to take over: a box at 45° keeps its incident face.
-        let steep = axes.each_ref().map(|axis| axis[2].abs());
-        let clearly = Wide::splat(1e-3);
-        let floor = steep[0] + clearly;
-        let j = steep[1].if_above(floor, one, Wide::ZERO);
-        let floor = steep[1].if_above(floor, steep[1] + clearly, floor);
-        let j = steep[2].if_above(floor, Wide::splat(2.0), j);
-        let pick = Pick(j);
-        let side = |s: usize| -> [Wide<L>; 3] {
-            std::array::from_fn(|x| pick.of([axes[s % 3][x], axes[(s + 1) % 3][x], axes[(s + 2) % 3][x]]))
-        };
-        let half = |s: usize| pick.of([half2[s % 3], half2[(s + 1) % 3], half2[(s + 2) % 3]]);
-        let scaled = |v: [Wide<L>; 3], scale: Wide<L>| [v[0] * scale, v[1] * scale, v[2] * scale * sign];
+        let [cx, cy, cz] = c;
+        let axes = [
+            around(k, role(swap, cx.columns(), [cx.x, cy.x, cz.x])),
+            around(k, role(swap, cy.columns(), [cx.y, cy.y, cz.y])),
+            around(k, role(swap, cz.columns(), [cx.z, cy.z, cz.z])),
+        ];
+        let position = around(k, role(swap, t.columns(), [-cx.dot(&t), -cy.dot(&t), -cz.dot(&t)]));
+        let half1 = around(k, half1);
+        let sign = W::ZERO.if_above(position[2], -one, one);
+        let j = steepest(&axes);
+        let [x, y, z] = &axes;
+        let (side0, side1, side2) = (pick_vector(j, [x, y, z]), pick_vector(j, [y, z, x]), pick_vector(j, [z, x, y]));
+        // In the order of the sides.
+        let [h0, h1, h2] = half2;
+        let reach = [pick(j, [h0, h1, h2]), pick(j, [h1, h2, h0]), pick(j, [h2, h0, h1])];
         // The incident face looks against the normal.
-        let towards = (side(0)[2] * sign).if_positive(-one, one);
-        let out = scaled(side(0), towards * half(0));
+        let towards = (side0[2] * sign).if_positive(-one, one);
+        let out = scaled(side0, towards * reach[0], sign);
         let offset = half1[2];
-        let growth = Wide::splat(1.0 + GROWTH);
+        let growth = W::splat(1.0 + GROWTH);
         Self {
+            swap,
             k,
             sign,
             offset,
             rectangle: [half1[0] * growth, half1[1] * growth],
             center: [position[0] + out[0], position[1] + out[1], (position[2] * sign - offset) + out[2]],
-            p: scaled(side(1), half(1)),
-            q: scaled(side(2), half(2)),
+            p: scaled(side1, reach[1], sign),
+            q: scaled(side2, reach[2], sign),
             j,
             towards,
         }
     }
 
-    /// What names the two faces.
+    /// What names the two faces: a whole number.
     #[inline(always)]
-    fn feature(&self, lane: usize) -> u32 {
-        let (k, j) = (self.k.0[lane] as u32, self.j[lane] as u32);
-        let (up, towards) = (u32::from(self.sign[lane] > 0.0), u32::from(self.towards[lane] > 0.0));
-        (k << 1 | up) << 8 | (j << 1 | towards) << 5
+    fn names(&self) -> W {
+        let (one, zero) = (W::splat(1.0), W::ZERO);
+        let reference = self.k + self.k + self.sign.if_positive(one, zero);
+        let incident = self.j + self.j + self.towards.if_positive(one, zero);
+        let box2 = self.swap.if_positive(W::splat(4096.0), zero);
+        box2 + reference * W::splat(256.0) + incident * W::splat(32.0)
     }
 
     /// The corners of the incident faces seen through the reference rectangles that are not further than `margin`.
     #[inline(always)]
-    fn clip(&self, margin: Wide<L>) -> Patches<L> {
+    fn clip<const L: usize>(&self, margin: W) -> Patches<L>
+    where
+        W: Lanes<L>,
+    {
         let mut patches = Patches {
-            x: [Wide::ZERO; CANDIDATES],
-            y: [Wide::ZERO; CANDIDATES],
-            height: [Wide::ZERO; CANDIDATES],
-            present: [0; L],
-            names: [[0; L]; CANDIDATES],
+            x: [[0.0; L]; CANDIDATES],
+            y: [[0.0; L]; CANDIDATES],
+            height: [[0.0; L]; CANDIDATES],
+            present: [0.0; L],
+            cut: [0.0; L],
+            faces: self.names().to_array(),
         };
-        self.cut_sides(margin, &mut patches);
-        self.look_for_corners(margin, &mut patches);
+        let (sides, cut) = self.cut_sides(margin, &mut patches);
+        let corners = self.look_for_corners(margin, &mut patches);
+        (patches.present, patches.cut) = ((sides + corners).to_array(), cut.to_array());
         patches
     }
 
-    /// Each side of the incident face, cut by the rectangle (Liang and Barsky).
+    /// Each side of the incident face, cut by the rectangle (Liang and Barsky). Gives the sums `present` and `cut`.
     #[inline(always)]
-    fn cut_sides(&self, margin: Wide<L>, patches: &mut Patches<L>) {
-        let (m, p, q, r) = (&self.center, &self.p, &self.q, &self.rectangle);
-        let (zero, one, two) = (Wide::<L>::ZERO, Wide::<L>::splat(1.0), Wide::<L>::splat(2.0));
-        // A side along the border may not divide by zero: a tiny slope keeps it inside or throws it far out.
-        let steep = |way: Wide<L>| way.abs().if_positive(way, Wide::splat(1e-30));
-        let inverse: [[Wide<L>; 2]; 2] = std::array::from_fn(|x| [p[x], q[x]].map(|side| one / steep(side * two)));
+    fn cut_sides<const L: usize>(&self, margin: W, patches: &mut Patches<L>) -> (W, W)
+    where
+        W: Lanes<L>,
+    {
+        let (m, p, q) = (&self.center, &self.p, &self.q);
+        let (zero, one, two) = (W::ZERO, W::splat(1.0), W::splat(2.0));
+        let inverse_p = [slope(p[0] * two), slope(p[1] * two)];
+        let inverse_q = [slope(q[0] * two), slope(q[1] * two)];
+        let (mut present, mut cut) = (zero, zero);
         for (e, (a, b)) in SIGNS.into_iter().enumerate() {
-            let corner: [Wide<L>; 3] = std::array::from_fn(|x| m[x] + Wide::splat(a) * p[x] + Wide::splat(b) * q[x]);
-            let along = if e % 2 == 0 { p } else { q };
-            let scale = if e < 2 { -two } else { two };
-            let way: [Wide<L>; 3] = std::array::from_fn(|x| scale * along[x]);
-            let (mut enter, mut leave) = (zero, one);
-            for x in 0..2 {
-                let inverse = if e < 2 { -inverse[x][e % 2] } else { inverse[x][e % 2] };
-                let (low, high) = ((-r[x] - corner[x]) * inverse, (r[x] - corner[x]) * inverse);
-                enter = low.min(high).max(enter);
-                leave = high.max(low).min(leave);
-            }
-            let at = |t: Wide<L>| [corner[0] + way[0] * t, corner[1] + way[1] * t, corner[2] + way[2] * t];
-            let crosses = enter.if_above(leave, zero, one);
-            patches.set(2 * e, at(enter), crosses, margin);
-            let ends = leave.if_above(enter, one.if_above(leave, one, zero), zero);
-            patches.set(2 * e + 1, at(leave), ends, margin);
-            let [first, second, _] = NAMES[e];
-            patches.names[2 * e] = std::array::from_fn(|lane| first | u32::from(enter[lane] > 0.0));
-            patches.names[2 * e + 1] = [second; L];
+            let (a, b) = (W::splat(a), W::splat(b));
+            let corner = [m[0] + a * p[0] + b * q[0], m[1] + a * p[1] + b * q[1], m[2] + a * p[2] + b * q[2]];
+            let (along, inverse) = if e % 2 == 0 { (p, &inverse_p) } else { (q, &inverse_q) };
+            let (scale, inverse) = if e < 2 { (-two, [-inverse[0], -inverse[1]]) } else { (two, *inverse) };
+            let way = [scale * along[0], scale * along[1], scale * along[2]];
+            let (enter, leave) = self.inside(&corner, inverse);
+            let (start, end) = (2 * e, 2 * e + 1);
+            let crosses = enter.if_above(leave, zero, W::splat((1 << start) as Real));
+            present += patches.set(start, at(&corner, &way, enter), crosses, margin);
+            let ends = leave.if_above(enter, one.if_above(leave, W::splat((1 << end) as Real), zero), zero);
+            present += patches.set(end, at(&corner, &way, leave), ends, margin);
+            cut += enter.if_positive(W::splat((1 << start) as Real), zero);
         }
+        (present, cut)
     }
 
-    /// Corners of the rectangle over the incident face: solves `s p + t q = corner − m` by Cramer's rule.
+    /// Where a side from `corner` enters and leaves the rectangle, as shares of its length.
     #[inline(always)]
-    fn look_for_corners(&self, margin: Wide<L>, patches: &mut Patches<L>) {
+    fn inside(&self, corner: &[W; 3], inverse: [W; 2]) -> (W, W) {
+        let r = &self.rectangle;
+        let (low, high) = ((-r[0] - corner[0]) * inverse[0], (r[0] - corner[0]) * inverse[0]);
+        let (enter, leave) = (low.min(high).max(W::ZERO), high.max(low).min(W::splat(1.0)));
+        let (low, high) = ((-r[1] - corner[1]) * inverse[1], (r[1] - corner[1]) * inverse[1]);
+        (low.min(high).max(enter), high.max(low).min(leave))
+    }
+
+    /// Corners of the rectangle over the incident face: solves `s p + t q = corner − m` by Cramer's rule. Gives the sum
+    /// `present`.
+    #[inline(always)]
+    fn look_for_corners<const L: usize>(&self, margin: W, patches: &mut Patches<L>) -> W
+    where
+        W: Lanes<L>,
+    {
         let (m, p, q, r) = (&self.center, &self.p, &self.q, &self.rectangle);
         let area = p[0] * q[1] - p[1] * q[0];
         let (s_slope, t_slope) = (p[2] / area, q[2] / area);
-        let (size, zero, one) = (area.abs(), Wide::ZERO, Wide::splat(1.0));
+        let (size, zero) = (area.abs(), W::ZERO);
+        let mut present = zero;
         for (e, (a, b)) in SIGNS.into_iter().enumerate() {
-            let at = [Wide::splat(a) * r[0], Wide::splat(b) * r[1]];
-            let (x, y) = (at[0] - m[0], at[1] - m[1]);
+            let corner = [W::splat(a) * r[0], W::splat(b) * r[1]];
+            let (x, y) = (corner[0] - m[0], corner[1] - m[1]);
             let (s, t) = (x * q[1] - y * q[0], p[0] * y - p[1] * x);
             let height = m[2] + (s * s_slope + t * t_slope);
-            let over = size.if_above(s.abs(), size.if_above(t.abs(), one, zero), zero);
-            patches.set(8 + e, [at[0], at[1], height], over, margin);
-            patches.names[8 + e] = [NAMES[e][2]; L];
+            let over = size.if_above(t.abs(), W::splat((256 << e) as Real), zero);
+            let over = size.if_above(s.abs(), over, zero);
+            present += patches.set(8 + e, [corner[0], corner[1], height], over, margin);
         }
+        present
     }
 
     /// Chosen corners as points in the frames of box 1, with their normals.
     #[inline(always)]
-    fn place(
+    fn place<const L: usize>(
         &self,
-        lanes: &CuboidLanes<L>,
-        c: &Columns<L>,
-        swap: Wide<L>,
-        (x, y): (&[Wide<L>; 4], &[Wide<L>; 4]),
+        lanes: &CuboidLanes<W>,
+        c: &Columns<W>,
+        (x, y): (&[[Real; L]; 4], &[[Real; L]; 4]),
         manifold: &mut WideManifold<L>,
-    ) {
-        let (zero, plane) = (Wide::ZERO, self.sign * self.offset);
-        let role = |first: Wide<L>, second: Wide<L>| swap.if_positive(second, first);
-        // From the order u, v, k back to x, y, z.
-        let back = |u: Wide<L>, v: Wide<L>, k: Wide<L>| WideVec3 {
-            x: self.k.of([k, v, u]),
-            y: self.k.of([u, k, v]),
-            z: self.k.of([v, u, k]),
-        };
-        let normal = back(zero, zero, self.sign);
-        let column = pick_column(&self.k, c).scale(-self.sign);
-        manifold.normal =
-            WideVec3 { x: role(normal.x, column.x), y: role(normal.y, column.y), z: role(normal.z, column.z) };
+    ) where
+        W: Lanes<L>,
+    {
+        let (swap, k, plane) = (self.swap, self.k, self.sign * self.offset);
+        let normal = back(k, [W::ZERO, W::ZERO, self.sign]);
+        let column = pick_column(k, c).scale(-self.sign);
+        manifold.normal = select(swap, &normal, &column).to_wide();
         for i in 0..4 {
-            let point = back(x[i], y[i], plane);
+            let (x, y) = (W::from_array(x[i]), W::from_array(y[i]));
+            let separation = W::from_array(manifold.separation[i].0);
+            let point = back(k, [x, y, plane]);
             // Where box 2 has the reference face, the point on box 1 is the one on the incident face.
-            let incident = back(x[i], y[i], plane + self.sign * manifold.separation[i]);
+            let incident = back(k, [x, y, plane + self.sign * separation]);
             let turned = c[0].scale(incident.x) + c[1].scale(incident.y) + c[2].scale(incident.z);
             let swapped = turned + lanes.pose.position;
-            manifold.point1[i] =
-                WideVec3 { x: role(point.x, swapped.x), y: role(point.y, swapped.y), z: role(point.z, swapped.z) };
+            manifold.point1[i] = select(swap, &point, &swapped).to_wide();
         }
     }
 }
 
+/// `second` where `swap` is positive, else `first`.
+#[inline(always)]
+fn select<W: Number>(swap: W, first: &LaneVec3<W>, second: &LaneVec3<W>) -> LaneVec3<W> {
+    let [x, y, z] = role(swap, first.columns(), second.columns());
+    LaneVec3 { x, y, z }
+}
+
+/// `1 / way`. A side along the border may not divide by zero: a tiny slope keeps it inside or throws it far out.
+#[inline(always)]
+fn slope<W: Number>(way: W) -> W {
+    W::splat(1.0) / way.abs().if_positive(way, W::splat(1e-30))
+}
+
+/// The point at share `t` of a side.
+#[inline(always)]
+fn at<W: Number>(corner: &[W; 3], way: &[W; 3], t: W) -> [W; 3] {
+    [corner[0] + way[0] * t, corner[1] + way[1] * t, corner[2] + way[2] * t]
+}
+
 impl<const L: usize> Patches<L> {
-    /// Writes a candidate; it counts where `valid` is positive and its height within the margin.
+    /// Writes a candidate. Gives `valid`, but zero where its height is beyond the margin.
     #[inline(always)]
-    fn set(&mut self, candidate: usize, [x, y, height]: [Wide<L>; 3], valid: Wide<L>, margin: Wide<L>) {
-        (self.x[candidate], self.y[candidate], self.height[candidate]) = (x, y, height);
-        for lane in 0..L {
-            let counts = (valid[lane] > 0.0) & (height[lane] <= margin[lane]);
-            self.present[lane] |= u32::from(counts) << candidate;
-        }
+    fn set<W: Lanes<L>>(&mut self, candidate: usize, [x, y, height]: [W; 3], valid: W, margin: W) -> W {
+        self.x[candidate] = x.to_array();
+        self.y[candidate] = y.to_array();
+        self.height[candidate] = height.to_array();
+        margin.if_at_least(height, valid, W::ZERO)
     }
 
     /// At most four candidates of a lane, and how many.
     #[inline(always)]
     fn choose(&self, lane: usize, size: Real) -> ([usize; 4], usize) {
-        let mut present = self.present[lane];
+        let mut present = self.present[lane] as u32;
         let count = present.count_ones() as usize;
         let mut places = [0; CANDIDATES];
         for place in places.iter_mut().take(count) {

@@ -27,13 +27,14 @@ mod axes;
 mod face;
 mod lanes;
 
-pub(crate) use axes::{Axes, Near};
-pub(crate) use lanes::{CuboidLanes, WideManifold};
+pub(crate) use axes::Near;
+pub(crate) use lanes::{CuboidLanes, CuboidPair, WideManifold};
 
 use super::distance::{Support, closest};
 use super::{Manifold, ManifoldPoint};
 use crate::math::{Mat3, Pose, Real, Vec3, clamp};
 use crate::shape::Cuboid;
+use crate::simd::{Lanes, Number, Quad, Wide};
 
 /// A face of box 2 is the reference when it is better by this share of the smaller box's [`cuboid_size`].
 const FACE_BIAS: Real = 2e-3;
@@ -55,42 +56,53 @@ const SIGNS: [(Real, Real); 4] = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -
 /// Cuboid against cuboid, one pair.
 pub(crate) fn cuboid_cuboid(cuboid1: &Cuboid, cuboid2: &Cuboid, pose: &Pose, margin: Real, manifold: &mut Manifold) {
     manifold.clear();
-    let mut lanes = CuboidLanes::<1>::EMPTY;
-    lanes.set(0, (cuboid1, cuboid2), pose, margin);
-    let axes = lanes.test_axes();
-    if axes.near(0).is_some() {
-        lanes.contacts(&axes, 1).push_lane(0, manifold);
+    let pair = CuboidPair::new((cuboid1, cuboid2), pose, margin);
+    let lanes = CuboidLanes::<Wide<1>>::load(&[&pair]);
+    if let Some(near) = lanes.test_axes().near(0) {
+        lanes.contacts(&[&pair], &[&near], 1).push_lane(0, manifold);
     }
 }
 
-impl<const L: usize> CuboidLanes<L> {
-    /// The contacts of the first `count` pairs, which are not apart.
+impl<W: Number> CuboidLanes<W> {
+    /// The contacts of the first `count` pairs, which are not apart; `self` is what `pairs` hold.
     #[inline(always)]
-    pub(crate) fn contacts(&self, axes: &Axes<L>, count: usize) -> WideManifold<L> {
-        let mut manifold = self.face_contacts(&axes.face, count);
+    pub(crate) fn contacts<const L: usize>(
+        &self,
+        pairs: &[&CuboidPair; L],
+        near: &[&Near; L],
+        count: usize,
+    ) -> WideManifold<L>
+    where
+        W: Lanes<L>,
+    {
+        let mut quads: [&Quad; L] = [&[0.0; 4]; L];
+        for (quad, near) in quads.iter_mut().zip(near) {
+            *quad = &near.0;
+        }
+        let [face, ..] = W::load(&quads);
+        let mut manifold = self.face_contacts(face, count);
         for lane in 0..count.min(L) {
-            if axes.edge[lane] > 0.0 || manifold.count[lane] == 0 {
-                self.edge_or_passing(axes, lane, &mut manifold);
+            if near[lane].edge() > 0.0 || manifold.count[lane] == 0 {
+                edge_or_passing(pairs[lane], near[lane], lane, &mut manifold);
             }
         }
         manifold
     }
+}
 
-    /// A lane in which a pair of edges is better than the face, or the face as clipped is empty.
-    fn edge_or_passing(&self, axes: &Axes<L>, lane: usize, manifold: &mut WideManifold<L>) {
-        let (pose, face) = (self.pose.get(lane), axes.face[lane] as usize);
-        let boxes = Boxes::new(self.half1.get(lane), self.half2.get(lane), &pose);
-        if axes.edge[lane] > 0.0 {
-            let pair = axes.edge[lane] as usize - 6;
-            let face_counts = boxes.cosine(pair, face) > ALIGNED;
-            if !(face_counts && manifold.stands_in(lane, axes.edge_gap[lane] - EDGE_BIAS * self.size[lane])) {
-                manifold.set_point(lane, boxes.edge_contact(pair));
-            }
+/// A lane in which a pair of edges is better than the face, or the face as clipped is empty.
+fn edge_or_passing<const L: usize>(boxes: &CuboidPair, near: &Near, lane: usize, manifold: &mut WideManifold<L>) {
+    let (a, b, pose, face) = (boxes.half1(), boxes.half2(), boxes.pose(), near.face() as usize);
+    if near.edge() > 0.0 {
+        let (pair, size) = (near.edge() as usize - 6, boxes.size());
+        let boxes = Boxes::new(a, b, &pose);
+        let face_counts = boxes.cosine(pair, face) > ALIGNED;
+        if !(face_counts && manifold.stands_in(lane, near.edge_gap() - EDGE_BIAS * size)) {
+            manifold.set_point(lane, boxes.edge_contact(pair));
         }
-        if manifold.count[lane] == 0 {
-            let (a, b) = (self.half1.get(lane), self.half2.get(lane));
-            manifold.set_point(lane, passing_by(a, b, &pose, (self.margin[lane], axes.face_gap[lane], face)));
-        }
+    }
+    if manifold.count[lane] == 0 {
+        manifold.set_point(lane, passing_by(a, b, &pose, (boxes.margin(), near.face_gap(), face)));
     }
 }
 

@@ -1,9 +1,11 @@
 //! Lanes against one pair at a time.
 
 use super::super::tests::Random;
-use super::{Axes, CuboidLanes, Manifold, cuboid_cuboid};
+use super::{CuboidLanes, CuboidPair, Manifold, Near, cuboid_cuboid};
 use crate::math::{Pose, Real, Rotation, Vec3};
 use crate::shape::Cuboid;
+use crate::simd::{Baseline, Instructions, Kernel, Lanes, Wide};
+use std::marker::PhantomData;
 
 /// Two boxes, where the second is, and the margin.
 type Pair = (Cuboid, Cuboid, Pose, Real);
@@ -39,28 +41,57 @@ fn alone(&(a, b, pose, margin): &Pair) -> Manifold {
 }
 
 /// What the engine does with a block: tests the axes of all, then finds the contacts of those that are not apart.
-fn together<const L: usize>(pairs: &[Pair]) -> Vec<Manifold> {
-    let mut found = vec![Manifold::EMPTY; pairs.len()];
-    let mut near = Vec::new();
-    for (chunk, pairs) in pairs.chunks(L).enumerate() {
-        let mut lanes = CuboidLanes::<L>::EMPTY;
-        for (lane, (a, b, pose, margin)) in pairs.iter().enumerate() {
-            lanes.set(lane, (a, b), pose, *margin);
+struct Together<'a, W, const L: usize> {
+    pairs: &'a [Pair],
+    found: &'a mut Vec<Manifold>,
+    lanes: PhantomData<W>,
+}
+
+impl<W: Lanes<L>, const L: usize> Kernel for Together<'_, W, L> {
+    #[inline(always)]
+    fn run(self) {
+        let mut near = Vec::new();
+        for (chunk, pairs) in self.pairs.chunks(L).enumerate() {
+            let mut cuboids = [CuboidPair::NONE; L];
+            for (lane, (a, b, pose, margin)) in pairs.iter().enumerate() {
+                cuboids[lane] = CuboidPair::new((a, b), pose, *margin);
+            }
+            let axes = CuboidLanes::<W>::load(&cuboids.each_ref()).test_axes();
+            near.extend((0..pairs.len()).filter_map(|lane| Some((chunk * L + lane, cuboids[lane], axes.near(lane)?))));
         }
-        let axes = lanes.test_axes();
-        near.extend((0..pairs.len()).filter_map(|lane| Some((chunk * L + lane, axes.near(lane)?))));
+        *self.found = vec![Manifold::EMPTY; self.pairs.len()];
+        for chunk in near.chunks(L) {
+            let (mut cuboids, mut told) = ([&CuboidPair::NONE; L], [&Near::NONE; L]);
+            for (lane, (_, pair, near)) in chunk.iter().enumerate() {
+                (cuboids[lane], told[lane]) = (pair, near);
+            }
+            let manifold = CuboidLanes::<W>::load(&cuboids).contacts(&cuboids, &told, chunk.len());
+            for (lane, (index, ..)) in chunk.iter().enumerate() {
+                manifold.push_lane(lane, &mut self.found[*index]);
+            }
+        }
     }
-    for chunk in near.chunks(L) {
-        let (mut lanes, mut axes) = (CuboidLanes::<L>::EMPTY, Axes::EMPTY);
-        for (lane, (index, told)) in chunk.iter().enumerate() {
-            let (a, b, pose, margin) = &pairs[*index];
-            lanes.set(lane, (a, b), pose, *margin);
-            axes.set(lane, told);
-        }
-        let manifold = lanes.contacts(&axes, chunk.len());
-        for (lane, (index, _)) in chunk.iter().enumerate() {
-            manifold.push_lane(lane, &mut found[*index]);
-        }
+}
+
+fn together<W: Lanes<L>, const L: usize>(level: impl Instructions, pairs: &[Pair]) -> Vec<Manifold> {
+    let mut found = Vec::new();
+    level.run(Together::<W, L> { pairs, found: &mut found, lanes: PhantomData });
+    found
+}
+
+/// By arrays of several lengths, and by the registers that this machine has.
+fn by_all_lanes(pairs: &[Pair]) -> Vec<Vec<Manifold>> {
+    let mut found = vec![
+        together::<Wide<4>, 4>(Baseline, pairs),
+        together::<Wide<8>, 8>(Baseline, pairs),
+        together::<Wide<16>, 16>(Baseline, pairs),
+    ];
+    #[cfg(target_arch = "x86_64")]
+    {
+        use crate::simd::{Avx2, Avx2Lanes, Avx512, Avx512Lanes, Sse2Lanes};
+        found.push(together::<Sse2Lanes, 4>(Baseline, pairs));
+        found.extend(Avx2::detect().map(|level| together::<Avx2Lanes, 8>(level, pairs)));
+        found.extend(Avx512::detect().map(|level| together::<Avx512Lanes, 16>(level, pairs)));
     }
     found
 }
@@ -79,7 +110,7 @@ fn lanes_give_the_manifolds_of_one_pair_at_a_time_bit_for_bit() {
     let mut random = Random(0x0C0B_01D5_1DE5_1DE5);
     let pairs: Vec<Pair> = (0..16_000).map(|round| pair(&mut random, round)).collect();
     let wanted: Vec<_> = pairs.iter().map(|pair| bits(&alone(pair))).collect();
-    for found in [together::<4>(&pairs), together::<8>(&pairs), together::<16>(&pairs)] {
+    for found in by_all_lanes(&pairs) {
         for (index, (found, wanted)) in found.iter().zip(&wanted).enumerate() {
             assert_eq!(bits(found), *wanted, "pair {index}: {:?}", pairs[index]);
         }

@@ -7,14 +7,16 @@
 use super::super::arbiters::surface_velocity;
 use super::super::pairs::{Pair, REUSE_ROTATION};
 use super::super::shapes::ShapeSlot;
-use super::contacts::{PairFrame, Places, WideFrame, turn_levers, update_contacts};
+use super::contacts::{FrameRecords, PairFrame, Places, WideFrame, turn_levers, update_contacts};
 use super::{Begin, CollideContext, News};
 use crate::arbiter::{Arbiter, ArbiterKey, ContactData, NONE, TANGENT_VELOCITY_OVERRIDDEN};
-use crate::math::{Pose, Real, Rotation, max, min};
-use crate::narrow_phase::{CuboidAxes, CuboidLanes, Manifold, NearCuboids, collide};
+use crate::math::{Pose, Real, Rotation, Vec3, max, min};
+use crate::narrow_phase::{CuboidLanes, CuboidPair, Manifold, NearCuboids, collide};
 use crate::parallel::{BlockList, SharedSlice};
 use crate::shape::Shape;
-use crate::simd::{Kernel, Number, Wide, WidePose, WideRotation, prefetch};
+use crate::simd::{Kernel, LanePose, LaneRotation, LaneVec3, Lanes, prefetch};
+use crate::solver::BodyMass;
+use std::marker::PhantomData;
 use std::mem::MaybeUninit;
 
 /// Words of the active set in a block.
@@ -50,6 +52,11 @@ impl<'a> BlockPairs<'a> {
     fn pair(&mut self, index: u32) -> &mut Pair {
         // SAFETY: the pairs of the block are this thread's, by the promise of `new`; `&mut self` keeps references apart.
         unsafe { self.pairs.get_mut(index as usize) }
+    }
+
+    fn shared(&self, index: u32) -> &Pair {
+        // SAFETY: as above, and `&self` lets nobody change the pairs meanwhile.
+        unsafe { self.pairs.get(index as usize) }
     }
 
     /// A pair and its arbiter, if it has one.
@@ -97,15 +104,37 @@ struct Fresh {
     between: Pose,
 }
 
+/// A pair of cuboids that are not apart, and what their axes have told.
+#[derive(Clone, Copy)]
+struct NearPair {
+    item: Fresh,
+    cuboids: CuboidPair,
+    found: NearCuboids,
+}
+
+/// Which manifolds still hold; a bit for each pair.
+struct ReuseTest<W> {
+    /// Centre frames of bodies 2 seen from those of bodies 1.
+    between: LanePose<W>,
+    kept: u32,
+    /// Body 1 is still turned as when the normal was put into world axes.
+    same_axes: u32,
+    conveyors: u32,
+}
+
+/// Stands in for bodies of pairs that a group lacks.
+static NO_MASS: BodyMass = BodyMass::NONE;
+
 /// The work on one block, `L` pairs at a time.
-pub(super) struct BlockKernel<'a, const L: usize> {
+pub(super) struct BlockKernel<'a, W, const L: usize> {
     pub context: &'a CollideContext<'a>,
     pub pairs: BlockPairs<'a>,
     pub news: BlockList<'a, News>,
     pub begins: BlockList<'a, Begin>,
+    pub lanes: PhantomData<W>,
 }
 
-impl<const L: usize> Kernel for BlockKernel<'_, L> {
+impl<W: Lanes<L>, const L: usize> Kernel for BlockKernel<'_, W, L> {
     #[inline(always)]
     fn run(mut self) {
         let near = self.drop_parted();
@@ -124,7 +153,7 @@ impl<const L: usize> Kernel for BlockKernel<'_, L> {
     }
 }
 
-impl<const L: usize> BlockKernel<'_, L> {
+impl<W: Lanes<L>, const L: usize> BlockKernel<'_, W, L> {
     /// The pairs whose fat boxes still overlap; the others are reported.
     #[inline(always)]
     fn drop_parted(&mut self) -> Queue<u32> {
@@ -152,48 +181,82 @@ impl<const L: usize> BlockKernel<'_, L> {
     /// Keeps the manifolds that still hold, or the lack of one, and lists the other pairs.
     #[inline(always)]
     fn keep_manifolds(&mut self, chunk: &[u32], fresh: &mut Queue<Fresh>) {
-        let (mut center1, mut center2, mut old) = (WidePose::<L>::ZERO, WidePose::<L>::ZERO, WidePose::<L>::ZERO);
-        let mut old_rotation = WideRotation::<L>::ZERO;
-        let (mut distance, mut rotation) = (Wide::<L>::ZERO, Wide::<L>::ZERO);
-        let mut holds = [false; L];
-        for (lane, &index) in chunk.iter().enumerate().take(L) {
-            let (context, pair) = (self.context, self.pairs.pair(index));
-            let [m1, m2] = pair.bodies.map(|body| &context.solver.masses[body as usize]);
-            center1.set(lane, &m1.pose());
-            center2.set(lane, &m2.pose());
-            old.set(lane, &pair.manifold_pose);
-            old_rotation.set(lane, pair.manifold_rotation);
-            (distance[lane], rotation[lane]) = pair.reuse_limits(context.settings.speculative_distance);
-            holds[lane] = pair.has_manifold
-                && (pair.arbiter != NONE
-                    || Pair::closes_slowly(context.closing(pair), context.settings.speculative_distance));
+        let ReuseTest { between, kept, same_axes, conveyors } = self.test_reuse(chunk);
+        let mut busy = !(kept & same_axes & !conveyors) & (u32::MAX >> (u32::BITS - chunk.len() as u32));
+        if busy == 0 {
+            return;
         }
-        let between = center1.relative(&center2);
-        let moved = between.position - old.position;
-        let turned = old.rotation.conjugate().mul(&between.rotation).vector();
-        let along = old_rotation.conjugate().mul(&center1.rotation).vector();
-        let (moved, turned, along) = (moved.dot(&moved), turned.dot(&turned), along.dot(&along));
-        let (distance, rotation) = (distance * distance, rotation * rotation);
-        for (lane, &index) in chunk.iter().enumerate().take(L) {
-            let holds = holds[lane] & (moved[lane] < distance[lane]) & (turned[lane] < rotation[lane]);
-            let same_axes = along[lane] < REUSE_ROTATION * REUSE_ROTATION;
+        let (position, q) = (&between.position, &between.rotation);
+        let positions = W::store(&[position.x, position.y, position.z, W::ZERO]);
+        let rotations = W::store(&[q.vector.x, q.vector.y, q.vector.z, q.w]);
+        while busy != 0 {
+            let lane = busy.trailing_zeros() as usize;
+            busy &= busy - 1;
+            let (index, holds) = (chunk[lane], kept >> lane & 1 == 1);
             if !holds {
-                fresh.push(Fresh { pair: index, between: between.get(lane) });
+                let ([px, py, pz, _], [x, y, z, w]) = (positions[lane], rotations[lane]);
+                let between = Pose::new(Vec3::new(px, py, pz), Rotation::from_xyzw(x, y, z, w));
+                fresh.push(Fresh { pair: index, between });
                 self.prefetch_fresh(index);
             }
-            let (pair, arbiter) = self.pairs.pair_and_arbiter(index);
-            if holds && same_axes && !pair.conveyor {
-                continue;
-            }
-            let Some(arbiter) = arbiter else { continue };
-            let rotations = [center1.rotation.get(lane), center2.rotation.get(lane)];
-            if pair.conveyor {
-                turn_conveyor(pair, self.context.shapes, rotations, &mut arbiter.data);
-            }
-            if holds && !same_axes {
-                pair.manifold_rotation = rotations[0];
-                turn_levers(&mut arbiter.data, rotations);
-            }
+            self.turn_along(index, holds && same_axes >> lane & 1 == 0);
+        }
+    }
+
+    /// Whether the manifolds of up to `L` pairs still hold.
+    #[inline(always)]
+    fn test_reuse(&self, chunk: &[u32]) -> ReuseTest<W> {
+        let (context, none) = (self.context, NO_MASS.quads());
+        let (mut masses1, mut masses2) = ([none; L], [none; L]);
+        let mut old = [&[[0.0; 4]; 3]; L];
+        let (mut distance, mut rotation) = ([0.0; L], [0.0; L]);
+        let (mut keepable, mut conveyors) = (0, 0);
+        for (lane, &index) in chunk.iter().enumerate().take(L) {
+            let pair = self.pairs.shared(index);
+            masses1[lane] = context.solver.masses[pair.bodies[0] as usize].quads();
+            masses2[lane] = context.solver.masses[pair.bodies[1] as usize].quads();
+            old[lane] = pair.quads();
+            (distance[lane], rotation[lane]) = pair.reuse_limits(context.settings.speculative_distance);
+            let holds = pair.has_manifold
+                && (pair.arbiter != NONE
+                    || Pair::closes_slowly(context.closing(pair), context.settings.speculative_distance));
+            keepable |= u32::from(holds) << lane;
+            conveyors |= u32::from(pair.conveyor) << lane;
+        }
+        let center1 = LanePose::<W>::load(&masses1);
+        let between = center1.relative(&LanePose::load(&masses2));
+        let [qx, qy, qz, qw] = W::load_quad(&old, 0);
+        let [px, py, pz, rx] = W::load_quad(&old, 1);
+        let [ry, rz, rw, _] = W::load_quad(&old, 2);
+        let old_between = LaneRotation { vector: LaneVec3 { x: qx, y: qy, z: qz }, w: qw };
+        let old_rotation = LaneRotation { vector: LaneVec3 { x: rx, y: ry, z: rz }, w: rw };
+        let moved = between.position - LaneVec3 { x: px, y: py, z: pz };
+        let turned = old_between.conjugate().mul(&between.rotation).vector;
+        let along = old_rotation.conjugate().mul(&center1.rotation).vector;
+        let (distance, rotation) = (W::from_array(distance), W::from_array(rotation));
+        let (distance, rotation, one) = (distance * distance, rotation * rotation, W::splat(1.0));
+        let still = rotation.if_above(turned.dot(&turned), one, W::ZERO);
+        let still = distance.if_above(moved.dot(&moved), still, W::ZERO);
+        let same_axes = W::splat(REUSE_ROTATION * REUSE_ROTATION).if_above(along.dot(&along), one, W::ZERO);
+        ReuseTest { between, kept: keepable & still.positive(), same_axes: same_axes.positive(), conveyors }
+    }
+
+    /// Turns what has to turn with its bodies, of pairs with arbiters.
+    #[inline(always)]
+    fn turn_along(&mut self, index: u32, turns_levers: bool) {
+        let context = self.context;
+        let (pair, arbiter) = self.pairs.pair_and_arbiter(index);
+        let Some(arbiter) = arbiter else { return };
+        if !pair.conveyor && !turns_levers {
+            return;
+        }
+        let rotations = pair.bodies.map(|body| context.solver.masses[body as usize].rotation);
+        if pair.conveyor {
+            turn_conveyor(pair, context.shapes, rotations, &mut arbiter.data);
+        }
+        if turns_levers {
+            pair.manifold_rotation = rotations[0];
+            turn_levers(&mut arbiter.data, rotations);
         }
     }
 
@@ -218,8 +281,9 @@ impl<const L: usize> BlockKernel<'_, L> {
         for chunk in cuboids.chunks(L) {
             self.test_axes(chunk, &mut near);
         }
+        let mut places = [Places::NONE; L];
         for chunk in near.items().chunks(L) {
-            self.clip_faces(chunk);
+            self.clip_faces(chunk, &mut places);
         }
     }
 
@@ -231,26 +295,30 @@ impl<const L: usize> BlockKernel<'_, L> {
         boxes[0] & boxes[1] && !pair.sensor && context.filters.contact.is_none()
     }
 
+    /// A pair as the cuboid kernel sees it.
     #[inline(always)]
-    fn gather_cuboids(&mut self, lanes: &mut CuboidLanes<L>, lane: usize, item: &Fresh) {
-        let (context, pair) = (self.context, self.pairs.pair(item.pair));
+    fn cuboid_pair(&self, item: &Fresh) -> CuboidPair {
+        let (context, pair) = (self.context, self.pairs.shared(item.pair));
         let [s1, s2] = pair.shapes.map(|slot| &context.shapes[slot as usize]);
-        if let (Shape::Cuboid(a), Shape::Cuboid(b)) = (&s1.geometry, &s2.geometry) {
-            lanes.set(lane, (a, b), &shapes_relative(&item.between, s1, s2), context.margin(pair));
+        match (&s1.geometry, &s2.geometry) {
+            (Shape::Cuboid(a), Shape::Cuboid(b)) => {
+                CuboidPair::new((a, b), &shapes_relative(&item.between, s1, s2), context.margin(pair))
+            }
+            _ => CuboidPair::NONE,
         }
     }
 
     /// Settles the pairs that are apart, and lists the others.
     #[inline(always)]
-    fn test_axes(&mut self, chunk: &[Fresh], near: &mut Queue<(Fresh, NearCuboids)>) {
-        let mut lanes = CuboidLanes::<L>::EMPTY;
+    fn test_axes(&mut self, chunk: &[Fresh], near: &mut Queue<NearPair>) {
+        let mut pairs = [CuboidPair::NONE; L];
         for (lane, item) in chunk.iter().enumerate().take(L) {
-            self.gather_cuboids(&mut lanes, lane, item);
+            pairs[lane] = self.cuboid_pair(item);
         }
-        let axes = lanes.test_axes();
+        let axes = CuboidLanes::<W>::load(&pairs.each_ref()).test_axes();
         for (lane, item) in chunk.iter().enumerate().take(L) {
             match axes.near(lane) {
-                Some(found) => near.push((*item, found)),
+                Some(found) => near.push(NearPair { item: *item, cuboids: pairs[lane], found }),
                 None => self.settle(item, &Places::NONE),
             }
         }
@@ -258,18 +326,17 @@ impl<const L: usize> BlockKernel<'_, L> {
 
     /// Finds the contacts of pairs that are near.
     #[inline(always)]
-    fn clip_faces(&mut self, chunk: &[(Fresh, NearCuboids)]) {
-        let (mut lanes, mut axes) = (CuboidLanes::<L>::EMPTY, CuboidAxes::<L>::EMPTY);
-        let mut frame = WideFrame::<L>::EMPTY;
-        for (lane, (item, found)) in chunk.iter().enumerate().take(L) {
-            self.gather_cuboids(&mut lanes, lane, item);
-            axes.set(lane, found);
-            frame.set(lane, self.pairs.pair(item.pair), self.context.shapes, self.context.solver);
+    fn clip_faces(&mut self, chunk: &[NearPair], places: &mut [Places; L]) {
+        let (mut pairs, mut near) = ([&CuboidPair::NONE; L], [&NearCuboids::NONE; L]);
+        let mut frames = FrameRecords::<L>::NONE;
+        for (lane, pair) in chunk.iter().enumerate().take(L) {
+            (pairs[lane], near[lane]) = (&pair.cuboids, &pair.found);
+            frames.set(lane, self.pairs.shared(pair.item.pair), self.context.shapes, self.context.solver);
         }
-        let manifold = lanes.contacts(&axes, chunk.len());
-        let places = frame.places(&manifold);
-        for (lane, (item, _)) in chunk.iter().enumerate().take(L) {
-            self.settle(item, &places.get(lane, &manifold));
+        let manifold = CuboidLanes::<W>::load(&pairs).contacts(&pairs, &near, chunk.len());
+        WideFrame::<W>::load(&frames).place(&manifold, places);
+        for (pair, places) in chunk.iter().zip(places) {
+            self.settle(&pair.item, places);
         }
     }
 

@@ -12,11 +12,12 @@ use super::super::shapes::ShapeSlot;
 use crate::arbiter::{Contact, ContactData, ONE_NORMAL, SLOTS, SolveMode};
 use crate::math::{Pose, Real, Rotation, Vec3};
 use crate::narrow_phase::{Manifold, ManifoldPoint, WideManifold};
-use crate::simd::{WidePose, WideRotation, WideVec3};
+use crate::simd::{LanePose, LaneRotation, LaneVec3, Lanes, Number, Quad};
 use crate::solver::SolverBodies;
 
 /// Where a contact is: what a new manifold changes of it.
 #[derive(Clone, Copy, Debug)]
+#[repr(C)] // in the order in which lanes are stored
 pub(super) struct Place {
     pub anchor1: Vec3,
     pub anchor2: Vec3,
@@ -28,6 +29,18 @@ pub(super) struct Place {
 impl Place {
     const NOWHERE: Self =
         Self { anchor1: Vec3::ZERO, anchor2: Vec3::ZERO, normal: Vec3::ZERO, separation: 0.0, feature: 0 };
+
+    /// Its numbers in order.
+    #[inline(always)]
+    fn of_quads([a, b, c]: &[Quad; 3], feature: u32) -> Self {
+        Self {
+            anchor1: Vec3::new(a[0], a[1], a[2]),
+            anchor2: Vec3::new(a[3], b[0], b[1]),
+            normal: Vec3::new(b[2], b[3], c[0]),
+            separation: c[1],
+            feature,
+        }
+    }
 }
 
 /// Up to four places.
@@ -87,64 +100,78 @@ impl PairFrame {
     }
 }
 
-/// [`PairFrame`], `L` side by side.
-pub(super) struct WideFrame<const L: usize> {
-    shape: WidePose<L>,
-    rotation1: WideRotation<L>,
-    rotation2: WideRotation<L>,
-    apart: WideVec3<L>,
+/// What [`WideFrame`] is loaded from.
+pub(super) struct FrameRecords<'a, const L: usize> {
+    masses1: [&'a [Quad; 4]; L],
+    masses2: [&'a [Quad; 4]; L],
+    /// Position and rotation of shape 1 seen from the centre of body 1.
+    shapes: [[Quad; 2]; L],
 }
 
-impl<const L: usize> WideFrame<L> {
-    pub const EMPTY: Self = Self {
-        shape: WidePose::ZERO,
-        rotation1: WideRotation::ZERO,
-        rotation2: WideRotation::ZERO,
-        apart: WideVec3::ZERO,
-    };
+/// Stands in for bodies of pairs that a group lacks.
+static NO_MASS: [Quad; 4] = [[0.0; 4]; 4];
+
+impl<'a, const L: usize> FrameRecords<'a, L> {
+    pub const NONE: Self = Self { masses1: [&NO_MASS; L], masses2: [&NO_MASS; L], shapes: [[[0.0; 4]; 2]; L] };
 
     #[inline(always)]
-    pub fn set(&mut self, lane: usize, pair: &Pair, shapes: &[ShapeSlot], bodies: &SolverBodies) {
-        let frame = PairFrame::new(pair, shapes, bodies);
-        self.shape.set(lane, &frame.shape);
-        self.rotation1.set(lane, frame.rotation1);
-        self.rotation2.set(lane, frame.rotation2);
-        self.apart.set(lane, frame.apart);
+    pub fn set(&mut self, lane: usize, pair: &Pair, shapes: &[ShapeSlot], bodies: &'a SolverBodies) {
+        let Pose { position: p, rotation: q } = shapes[pair.shapes[0] as usize].from_center;
+        self.masses1[lane] = bodies.masses[pair.bodies[0] as usize].quads();
+        self.masses2[lane] = bodies.masses[pair.bodies[1] as usize].quads();
+        self.shapes[lane] = [[p.x, p.y, p.z, q.x], [q.y, q.z, q.w, 0.0]];
+    }
+}
+
+/// [`PairFrame`], several side by side.
+pub(super) struct WideFrame<W> {
+    shape: LanePose<W>,
+    rotation1: LaneRotation<W>,
+    rotation2: LaneRotation<W>,
+    apart: LaneVec3<W>,
+}
+
+impl<W: Number> WideFrame<W> {
+    #[inline(always)]
+    pub fn load<const L: usize>(records: &FrameRecords<'_, L>) -> Self
+    where
+        W: Lanes<L>,
+    {
+        let center1 = LanePose::<W>::load(&records.masses1);
+        let center2 = LanePose::<W>::load(&records.masses2);
+        Self {
+            shape: LanePose::load(&records.shapes.each_ref()),
+            rotation1: center1.rotation,
+            rotation2: center2.rotation,
+            apart: center2.position - center1.position,
+        }
     }
 
     /// What [`PairFrame::place`] does to each point of each lane.
     #[inline(always)]
-    pub fn places(&self, manifold: &WideManifold<L>) -> WidePlaces<L> {
-        let normal = self.rotation1.rotate(&self.shape.rotation.rotate(&manifold.normal));
-        let mut places = WidePlaces { points: [[WideVec3::ZERO; 2]; SLOTS], normal };
-        for (i, place) in places.points.iter_mut().enumerate() {
-            let anchor1 = self.shape.rotation.rotate(&manifold.point1[i]) + self.shape.position;
-            let arm2 = self.rotation1.rotate(&anchor1) + normal.scale(manifold.separation[i]) - self.apart;
-            *place = [anchor1, self.rotation2.inverse_rotate(&arm2)];
+    pub fn place<const L: usize>(&self, manifold: &WideManifold<L>, places: &mut [Places; L])
+    where
+        W: Lanes<L>,
+    {
+        let normal = self.rotation1.rotate(&self.shape.rotation.rotate(&manifold.normal.to_lanes()));
+        let mut most = 0;
+        for (places, &count) in places.iter_mut().zip(&manifold.count) {
+            places.count = count as usize;
+            most = most.max(places.count);
         }
-        places
-    }
-}
-
-/// [`Places`] of `L` pairs.
-pub(super) struct WidePlaces<const L: usize> {
-    /// Both anchors of each point.
-    points: [[WideVec3<L>; 2]; SLOTS],
-    normal: WideVec3<L>,
-}
-
-impl<const L: usize> WidePlaces<L> {
-    #[inline(always)]
-    pub fn get(&self, lane: usize, manifold: &WideManifold<L>) -> Places {
-        let mut places = Places::NONE;
-        places.count = manifold.count[lane] as usize;
-        let normal = self.normal.get(lane);
-        for (i, place) in places.points.iter_mut().enumerate().take(places.count) {
-            let [anchor1, anchor2] = self.points[i].each_ref().map(|wide| wide.get(lane));
-            let (separation, feature) = (manifold.separation[i][lane], manifold.feature[i][lane]);
-            *place = Place { anchor1, anchor2, normal, separation, feature };
+        for i in 0..most.min(SLOTS) {
+            let (point, separation) = (manifold.point1[i].to_lanes(), W::from_array(manifold.separation[i].0));
+            let a = self.shape.rotation.rotate(&point) + self.shape.position;
+            let arm2 = self.rotation1.rotate(&a) + normal.scale(separation) - self.apart;
+            let b = self.rotation2.inverse_rotate(&arm2);
+            let first = W::store(&[a.x, a.y, a.z, b.x]);
+            let second = W::store(&[b.y, b.z, normal.x, normal.y]);
+            let third = W::store(&[normal.z, separation, W::ZERO, W::ZERO]);
+            for (lane, places) in places.iter_mut().enumerate() {
+                let quads = [first[lane], second[lane], third[lane]];
+                places.points[i] = Place::of_quads(&quads, manifold.feature[i][lane]);
+            }
         }
-        places
     }
 }
 

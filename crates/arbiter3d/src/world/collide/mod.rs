@@ -24,11 +24,12 @@ use crate::math::Real;
 use crate::narrow_phase::{Manifold, collide};
 use crate::parallel::{Gather, SharedSlice};
 #[cfg(target_arch = "x86_64")]
-use crate::simd::{Avx2, Avx512};
-use crate::simd::{Baseline, Instructions, SimdLevel};
+use crate::simd::{Avx2, Avx2Lanes, Avx512, Avx512Lanes, Sse2Lanes};
+use crate::simd::{Baseline, Instructions, Lanes, SimdLevel, Wide};
 use crate::solver::SolverBodies;
 use block::{BlockKernel, PAIRS_PER_BLOCK, WORDS_PER_BLOCK};
 use contacts::{Places, update_contacts};
+use std::marker::PhantomData;
 
 /// What a pair has to tell beyond its own records.
 #[derive(Clone, Copy, Debug)]
@@ -86,12 +87,19 @@ impl World {
         let blocks = self.active_pairs.words().chunks(WORDS_PER_BLOCK).enumerate();
         scratch.blocks.extend(blocks.filter(|(_, words)| words.iter().any(|&word| word != 0)).map(|(i, _)| i as u32));
         match self.level {
-            SimdLevel::Scalar => self.run_pairs::<_, 1>(Baseline, dt, &scratch),
+            SimdLevel::Scalar => self.run_pairs::<_, Wide<1>, 1>(Baseline, dt, &scratch),
             #[cfg(target_arch = "x86_64")]
-            SimdLevel::Avx2 if let Some(avx2) = Avx2::detect() => self.run_pairs::<_, 8>(avx2, dt, &scratch),
+            SimdLevel::Avx2 if let Some(avx2) = Avx2::detect() => {
+                self.run_pairs::<_, Avx2Lanes, 8>(avx2, dt, &scratch);
+            }
             #[cfg(target_arch = "x86_64")]
-            SimdLevel::Avx512 if let Some(avx512) = Avx512::detect() => self.run_pairs::<_, 16>(avx512, dt, &scratch),
-            _ => self.run_pairs::<_, 4>(Baseline, dt, &scratch),
+            SimdLevel::Avx512 if let Some(avx512) = Avx512::detect() => {
+                self.run_pairs::<_, Avx512Lanes, 16>(avx512, dt, &scratch);
+            }
+            #[cfg(target_arch = "x86_64")]
+            _ => self.run_pairs::<_, Sse2Lanes, 4>(Baseline, dt, &scratch),
+            #[cfg(not(target_arch = "x86_64"))]
+            _ => self.run_pairs::<_, Wide<4>, 4>(Baseline, dt, &scratch),
         }
         for item in scratch.news.list().drain(..) {
             match item {
@@ -118,7 +126,12 @@ impl World {
     }
 
     /// The blocks with active pairs, with the instructions of a level.
-    fn run_pairs<I: Instructions, const L: usize>(&mut self, level: I, dt: Real, scratch: &NarrowPhaseScratch) {
+    fn run_pairs<I: Instructions, W: Lanes<L>, const L: usize>(
+        &mut self,
+        level: I,
+        dt: Real,
+        scratch: &NarrowPhaseScratch,
+    ) {
         let context = CollideContext {
             shapes: &self.shapes,
             bodies: &self.bodies,
@@ -135,12 +148,13 @@ impl World {
         self.pool.run(scratch.blocks.len(), |index| {
             let block = scratch.blocks[index] as usize;
             let words = &active[block * WORDS_PER_BLOCK..((block + 1) * WORDS_PER_BLOCK).min(active.len())];
-            level.run(BlockKernel::<L> {
+            level.run(BlockKernel::<W, L> {
                 context: &context,
                 // SAFETY: `run` gives each block to one thread, once.
                 pairs: unsafe { block::BlockPairs::new(&pairs, &arbiters, block, words) },
                 news: scratch.news.block(),
                 begins: scratch.begins.block(),
+                lanes: PhantomData,
             });
         });
     }
