@@ -57,15 +57,15 @@ struct Patches<const L: usize> {
 impl<W: Number> CuboidLanes<W> {
     /// Clips the incident face against the reference face `axis`, 0 to 5.
     #[inline(always)]
-    pub(super) fn face_contacts<const L: usize>(&self, axis: W, count: usize) -> WideManifold<L>
+    pub(super) fn face_contacts<const L: usize>(&self, axis: W, count: usize, manifold: &mut WideManifold<L>)
     where
         W: Lanes<L>,
     {
         let c = self.pose.rotation.axes();
         let pairs = FacePairs::new(self, &c, axis);
-        let patches = pairs.clip::<L>(self.margin);
+        let mut patches = Patches::<L>::EMPTY;
+        pairs.clip(self.margin, &mut patches);
         let size = self.size.to_array();
-        let mut manifold = WideManifold::EMPTY;
         let (mut x, mut y) = ([[0.0; L]; 4], [[0.0; L]; 4]);
         for lane in 0..count.min(L) {
             let base = patches.faces[lane] as u32;
@@ -79,8 +79,7 @@ impl<W: Number> CuboidLanes<W> {
                 manifold.feature[i][lane] = base | NAMES[candidate] | (cut >> candidate & 1);
             }
         }
-        pairs.place(self, &c, (&x, &y), &mut manifold);
-        manifold
+        pairs.place(self, &c, (&x, &y), manifold);
     }
 }
 
@@ -185,22 +184,14 @@ impl<W: Number> FacePairs<W> {
 
     /// The corners of the incident faces seen through the reference rectangles that are not further than `margin`.
     #[inline(always)]
-    fn clip<const L: usize>(&self, margin: W) -> Patches<L>
+    fn clip<const L: usize>(&self, margin: W, patches: &mut Patches<L>)
     where
         W: Lanes<L>,
     {
-        let mut patches = Patches {
-            x: [[0.0; L]; CANDIDATES],
-            y: [[0.0; L]; CANDIDATES],
-            height: [[0.0; L]; CANDIDATES],
-            present: [0.0; L],
-            cut: [0.0; L],
-            faces: self.names().to_array(),
-        };
-        let (sides, cut) = self.cut_sides(margin, &mut patches);
-        let corners = self.look_for_corners(margin, &mut patches);
+        let (sides, cut) = self.cut_sides(margin, patches);
+        let corners = self.look_for_corners(margin, patches);
         (patches.present, patches.cut) = ((sides + corners).to_array(), cut.to_array());
-        patches
+        patches.faces = self.names().to_array();
     }
 
     /// Each side of the incident face, cut by the rectangle (Liang and Barsky). Gives the sums `present` and `cut`.
@@ -313,6 +304,15 @@ fn at<W: Number>(corner: &[W; 3], way: &[W; 3], t: W) -> [W; 3] {
 }
 
 impl<const L: usize> Patches<L> {
+    const EMPTY: Self = Self {
+        x: [[0.0; L]; CANDIDATES],
+        y: [[0.0; L]; CANDIDATES],
+        height: [[0.0; L]; CANDIDATES],
+        present: [0.0; L],
+        cut: [0.0; L],
+        faces: [0.0; L],
+    };
+
     /// Writes a candidate. Gives `valid`, but zero where its height is beyond the margin.
     #[inline(always)]
     fn set<W: Lanes<L>>(&mut self, candidate: usize, [x, y, height]: [W; 3], valid: W, margin: W) -> W {

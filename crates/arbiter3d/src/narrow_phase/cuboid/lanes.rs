@@ -100,7 +100,7 @@ pub(crate) struct WideManifold<const L: usize> {
 }
 
 impl<const L: usize> WideManifold<L> {
-    pub(super) const EMPTY: Self = Self {
+    pub(crate) const EMPTY: Self = Self {
         point1: [LaneVec3::ZERO; 4],
         separation: [Wide::ZERO; 4],
         feature: [[0; L]; 4],

@@ -59,20 +59,22 @@ pub(crate) fn cuboid_cuboid(cuboid1: &Cuboid, cuboid2: &Cuboid, pose: &Pose, mar
     let pair = CuboidPair::new((cuboid1, cuboid2), pose, margin);
     let lanes = CuboidLanes::<Wide<1>>::load(&[&pair]);
     if let Some(near) = lanes.test_axes().near(0) {
-        lanes.contacts(&[&pair], &[&near], 1).push_lane(0, manifold);
+        let mut found = WideManifold::EMPTY;
+        lanes.contacts(&[&pair], &[&near], 1, &mut found);
+        found.push_lane(0, manifold);
     }
 }
 
 impl<W: Number> CuboidLanes<W> {
-    /// The contacts of the first `count` pairs, which are not apart; `self` is what `pairs` hold.
+    /// Puts the contacts of the first `count` pairs, which are not apart, into `manifold`; `self` is what `pairs` hold.
     #[inline(always)]
     pub(crate) fn contacts<const L: usize>(
         &self,
         pairs: &[&CuboidPair; L],
         near: &[&Near; L],
         count: usize,
-    ) -> WideManifold<L>
-    where
+        manifold: &mut WideManifold<L>,
+    ) where
         W: Lanes<L>,
     {
         let mut quads: [&Quad; L] = [&[0.0; 4]; L];
@@ -80,13 +82,12 @@ impl<W: Number> CuboidLanes<W> {
             *quad = &near.0;
         }
         let [face, ..] = W::load(&quads);
-        let mut manifold = self.face_contacts(face, count);
+        self.face_contacts(face, count, manifold);
         for lane in 0..count.min(L) {
             if near[lane].edge() > 0.0 || manifold.count[lane] == 0 {
-                edge_or_passing(pairs[lane], near[lane], lane, &mut manifold);
+                edge_or_passing(pairs[lane], near[lane], lane, manifold);
             }
         }
-        manifold
     }
 }
 

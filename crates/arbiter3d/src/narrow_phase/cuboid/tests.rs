@@ -1,7 +1,7 @@
 //! Lanes against one pair at a time.
 
 use super::super::tests::Random;
-use super::{CuboidLanes, CuboidPair, Manifold, Near, cuboid_cuboid};
+use super::{CuboidLanes, CuboidPair, Manifold, Near, WideManifold, cuboid_cuboid};
 use crate::math::{Pose, Real, Rotation, Vec3};
 use crate::shape::Cuboid;
 use crate::simd::{Baseline, Instructions, Kernel, Lanes, Wide};
@@ -59,13 +59,14 @@ impl<W: Lanes<L>, const L: usize> Kernel for Together<'_, W, L> {
             let axes = CuboidLanes::<W>::load(&cuboids.each_ref()).test_axes();
             near.extend((0..pairs.len()).filter_map(|lane| Some((chunk * L + lane, cuboids[lane], axes.near(lane)?))));
         }
+        let mut manifold = WideManifold::EMPTY;
         *self.found = vec![Manifold::EMPTY; self.pairs.len()];
         for chunk in near.chunks(L) {
             let (mut cuboids, mut told) = ([&CuboidPair::NONE; L], [&Near::NONE; L]);
             for (lane, (_, pair, near)) in chunk.iter().enumerate() {
                 (cuboids[lane], told[lane]) = (pair, near);
             }
-            let manifold = CuboidLanes::<W>::load(&cuboids).contacts(&cuboids, &told, chunk.len());
+            CuboidLanes::<W>::load(&cuboids).contacts(&cuboids, &told, chunk.len(), &mut manifold);
             for (lane, (index, ..)) in chunk.iter().enumerate() {
                 manifold.push_lane(lane, &mut self.found[*index]);
             }

@@ -11,7 +11,7 @@ use super::contacts::{FrameRecords, PairFrame, Places, WideFrame, turn_levers, u
 use super::{Begin, CollideContext, News};
 use crate::arbiter::{Arbiter, ArbiterKey, ContactData, NONE, TANGENT_VELOCITY_OVERRIDDEN};
 use crate::math::{Pose, Real, Rotation, Vec3, max, min};
-use crate::narrow_phase::{CuboidLanes, CuboidPair, Manifold, NearCuboids, collide};
+use crate::narrow_phase::{CuboidLanes, CuboidPair, Manifold, NearCuboids, WideManifold, collide};
 use crate::parallel::{BlockList, SharedSlice};
 use crate::shape::Shape;
 use crate::simd::{Kernel, LanePose, LaneRotation, LaneVec3, Lanes, prefetch};
@@ -281,9 +281,9 @@ impl<W: Lanes<L>, const L: usize> BlockKernel<'_, W, L> {
         for chunk in cuboids.chunks(L) {
             self.test_axes(chunk, &mut near);
         }
-        let mut places = [Places::NONE; L];
+        let (mut manifold, mut places) = (WideManifold::EMPTY, [Places::NONE; L]);
         for chunk in near.items().chunks(L) {
-            self.clip_faces(chunk, &mut places);
+            self.clip_faces(chunk, &mut manifold, &mut places);
         }
     }
 
@@ -326,15 +326,15 @@ impl<W: Lanes<L>, const L: usize> BlockKernel<'_, W, L> {
 
     /// Finds the contacts of pairs that are near.
     #[inline(always)]
-    fn clip_faces(&mut self, chunk: &[NearPair], places: &mut [Places; L]) {
+    fn clip_faces(&mut self, chunk: &[NearPair], manifold: &mut WideManifold<L>, places: &mut [Places; L]) {
         let (mut pairs, mut near) = ([&CuboidPair::NONE; L], [&NearCuboids::NONE; L]);
         let mut frames = FrameRecords::<L>::NONE;
         for (lane, pair) in chunk.iter().enumerate().take(L) {
             (pairs[lane], near[lane]) = (&pair.cuboids, &pair.found);
             frames.set(lane, self.pairs.shared(pair.item.pair), self.context.shapes, self.context.solver);
         }
-        let manifold = CuboidLanes::<W>::load(&pairs).contacts(&pairs, &near, chunk.len());
-        WideFrame::<W>::load(&frames).place(&manifold, places);
+        CuboidLanes::<W>::load(&pairs).contacts(&pairs, &near, chunk.len(), manifold);
+        WideFrame::<W>::load(&frames).place(manifold, places);
         for (pair, places) in chunk.iter().zip(places) {
             self.settle(&pair.item, places);
         }
