@@ -32,6 +32,8 @@ const PARTS_PER_THREAD: usize = 16;
 
 /// Awake bodies, pairs and arbiters from which on a step uses several threads: below, waiting for each other costs more.
 const WORK_FOR_THREADS: usize = 1500;
+/// Milliseconds of the last step from which on threads pay off, however few the bodies.
+const TIME_FOR_THREADS: f64 = 0.3;
 
 /// Stiffest spring of a contact, as a share of the substep rate: past it, tall stacks ring.
 const MAX_CONTACT_RATE: Real = 0.1875;
@@ -109,7 +111,8 @@ impl World {
         }
         let mut clock = PhaseClock::start();
         let work = self.awake.len() + self.active_pairs.len() + self.arbiters.order().len();
-        self.pool.begin_step(work >= WORK_FOR_THREADS);
+        // Few bodies can be much work too: meshes. What the last step took tells.
+        self.pool.begin_step(work >= WORK_FOR_THREADS || self.timings.total() > TIME_FOR_THREADS);
         self.events.begin_step();
         self.flush_events();
         self.apply_forces();
