@@ -8,7 +8,8 @@
 //! The caller tells what the entry at a place has as its hash, and whether it is the one wanted. Invariant: between an entry
 //! and the slot that its hash names there is no empty slot.
 
-use crate::arbiter::NONE;
+/// "None" among indices.
+pub(crate) const NONE: u32 = u32::MAX;
 
 /// Slots of the smallest table.
 const MIN_SLOTS: usize = 16;

@@ -85,8 +85,6 @@ fn restless(threads: usize) -> World {
         };
         let moving = BodyDefinition {
             linear_velocity: Vec3::new(f32::from(i % 7) - 3.0, 0.0, f32::from(i % 5) - 2.0),
-            // An island that falls asleep for the first time is given its place: that would be counted.
-            can_sleep: false,
             ..BodyDefinition::dynamic().at(position)
         };
         let body = world.add_body(&moving).unwrap();

@@ -8,13 +8,11 @@
 use super::contact_data::ContactData;
 use super::key::ArbiterKey;
 use crate::id::BodyId;
+pub(crate) use crate::place_table::NONE;
 use crate::place_table::PlaceTable;
 use crate::storage::{self, Peak};
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
-
-/// "None" among indices.
-pub(crate) const NONE: u32 = u32::MAX;
 
 /// Names an arbiter for as long as it lives.
 ///

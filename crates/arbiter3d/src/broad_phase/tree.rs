@@ -296,7 +296,7 @@ impl DynamicTree {
     /// Brings the tree up to date with the boxes of the leaves listed, and marks them.
     ///
     /// Few are lifted one by one. For many, each hands its box to its node, and one pass over all nodes from the bottom up
-    /// makes all boxes tight: with 8,000 leaves that all move, a quarter of the time.
+    /// makes all boxes tight.
     pub(super) fn lift_leaves(&mut self, leaves: impl ExactSizeIterator<Item = u32>) {
         if leaves.len() * BULK_SHARE < self.len() || self.len() < 3 {
             leaves.for_each(|leaf| self.lift_leaf(leaf));
