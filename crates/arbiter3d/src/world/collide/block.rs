@@ -11,7 +11,7 @@ use super::contacts::{FrameRecords, PairFrame, Places, WideFrame, turn_levers, u
 use super::{Begin, CollideContext, News};
 use crate::arbiter::{Arbiter, ArbiterKey, ContactData, NONE, TANGENT_VELOCITY_OVERRIDDEN};
 use crate::math::{Pose, Real, Rotation, Vec3, max, min};
-use crate::narrow_phase::{CuboidLanes, CuboidPair, Manifold, NearCuboids, WideManifold, collide};
+use crate::narrow_phase::{CuboidLanes, CuboidPair, Manifold, NearCuboids, WideManifold, collide_on};
 use crate::parallel::{BlockList, SharedSlice};
 use crate::shape::Shape;
 use crate::simd::{Kernel, LanePose, LaneRotation, LaneVec3, Lanes, prefetch};
@@ -349,8 +349,9 @@ impl<W: Lanes<L>, const L: usize> BlockKernel<'_, W, L> {
         let pair = self.pairs.pair(fresh.pair);
         let [s1, s2] = pair.shapes.map(|slot| &context.shapes[slot as usize]);
         let relative = shapes_relative(&fresh.between, s1, s2);
-        let mut manifold = Manifold::EMPTY;
-        collide(&s1.geometry, &s2.geometry, &relative, context.margin(pair), &mut pair.cache, &mut manifold);
+        let (mut manifold, margin) = (Manifold::EMPTY, context.margin(pair));
+        let kept = (&mut pair.cache, &mut manifold);
+        collide_on(context.level, (&s1.geometry, &s2.geometry), &relative, margin, kept);
         if !context.filters.passes_contact(pair, (context.shapes, context.bodies), &mut manifold) {
             manifold.clear();
         }

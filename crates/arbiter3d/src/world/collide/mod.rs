@@ -57,6 +57,7 @@ struct CollideContext<'a> {
     solver: &'a SolverBodies,
     broad_phase: &'a crate::broad_phase::BroadPhase,
     settings: &'a WorldSettings,
+    level: SimdLevel,
     filters: &'a UserFilters,
     /// Shapes whose proxies have moved since the last narrow phase.
     moved: &'a [bool],
@@ -138,6 +139,7 @@ impl World {
             solver: &self.solver_bodies,
             broad_phase: &self.broad_phase,
             settings: &self.scaled,
+            level: self.level,
             filters: &self.filters,
             moved: &self.moved_shapes,
             dt,
