@@ -16,7 +16,7 @@ use super::triangle::{Frame, Group, Reach, Solid};
 use super::triangle_lanes::Near;
 use super::triangle_solid::Solids;
 use super::{Manifold, ManifoldPoint, PairCache};
-use crate::math::{Aabb, Mat3, Pose, Real, Vec3};
+use crate::math::{Aabb, Mat3, Pose, Real, Vec3, abs3};
 use crate::shape::{LEAF, Leaves, MeshSides, Shape, TriangleMesh};
 use crate::simd::{LaneVec3, Lanes};
 
@@ -73,16 +73,18 @@ impl Contact<'_> {
 
     /// Adds the points of all triangles near the shape. Returns whether one might overlap that gave no point.
     fn touch_all(&self, solid: &mut impl Solid, frame: &Frame, reach: &Reach, out: &mut Candidates) -> bool {
+        let bounds = solid.bounds().expand(self.margin);
         let near = Near {
             frame,
-            aabb: self.aabb,
-            bounds: solid.bounds().expand(self.margin),
+            reach,
+            bounds,
+            size: abs3(bounds.center()).max_element() + bounds.half_extents().max_element(),
             center: frame.position + frame.rotation * solid.center(),
             one_sided: self.mesh.sides() == MeshSides::One,
             behind: BEHIND * reach.scale,
         };
         let (mesh, touching) = (self.mesh, Group::default());
-        let mut sieve = Sieve { mesh, near, solid, reach, out, touching, missing: false };
+        let mut sieve = Sieve { mesh, near, solid, out, touching, missing: false };
         mesh.walk(&self.aabb, &mut sieve);
         let Sieve { solid, out, mut touching, missing, .. } = sieve;
         let missing = missing | solid.touch_group(mesh, frame, &mut touching, reach, out);
@@ -95,7 +97,6 @@ struct Sieve<'a, S> {
     mesh: &'a TriangleMesh,
     near: Near<'a>,
     solid: &'a mut S,
-    reach: &'a Reach,
     out: &'a mut Candidates,
     touching: Group,
     missing: bool,
@@ -109,7 +110,7 @@ impl<S: Solid> Leaves for Sieve<'_, S> {
 
     #[inline(always)]
     fn leaf<W: Lanes<LEAF>>(&mut self, first: usize, count: usize) {
-        let found = self.near.sides(&self.mesh.corners_of_leaf::<W>(first, count));
+        let found = self.near.sides(&*self.solid, &self.mesh.corners_of_leaf::<W>(first, count));
         let mut bits = found.abs().positive() & ((1 << count) - 1);
         let sides = found.to_array();
         while bits != 0 {
@@ -117,7 +118,7 @@ impl<S: Solid> Leaves for Sieve<'_, S> {
             bits &= bits - 1;
             if self.touching.push((first + lane) as u32, sides[lane]) {
                 self.missing |=
-                    self.solid.touch_group(self.mesh, self.near.frame, &mut self.touching, self.reach, self.out);
+                    self.solid.touch_group(self.mesh, self.near.frame, &mut self.touching, self.near.reach, self.out);
             }
         }
     }

@@ -7,8 +7,10 @@
 //! the face beside it, with the plane's own distance, and never the edge: seams inside a surface are not felt.
 
 use super::mesh_points::{Candidate, Candidates, NO_FACET};
+use super::triangle_lanes::Planes;
 use crate::math::{Aabb, Mat3, Real, Vec3, abs3, clamp, max, max3, min, min3};
 use crate::shape::{Capsule, Facet, LEAF as LANES, Sphere, Surroundings, TriangleMesh};
+use crate::simd::Lanes;
 
 /// Sine by which a normal may leave the range that an edge or a corner allows: rounding, not geometry.
 const ALLOWED_SINE: Real = 2e-3;
@@ -269,6 +271,8 @@ pub(super) trait Solid {
     fn inner_radius(&self) -> Real;
     /// The box around the shape in its frame.
     fn bounds(&self) -> Aabb;
+    /// Zero where a triangle is farther than the margin, as far as can be told at a small cost.
+    fn keep_reached<W: Lanes<LANES>>(&self, sides: W, planes: &Planes<W>, margin: Real) -> W;
     /// Adds the points of the triangles of a group, which is empty after it, or keeps some for [`Solid::finish`]. Returns
     /// whether one might overlap the shape but gave no point, because it is the neighbours' matter: if they give none
     /// either, it is looked at again.
@@ -297,6 +301,11 @@ impl Solid for Sphere {
 
     fn bounds(&self) -> Aabb {
         self.local_aabb()
+    }
+
+    #[inline(always)]
+    fn keep_reached<W: Lanes<LANES>>(&self, sides: W, planes: &Planes<W>, _margin: Real) -> W {
+        planes.keep_low(sides, &[Vec3::ZERO], self.radius())
     }
 
     fn touch_group(
@@ -375,6 +384,12 @@ impl Solid for Capsule {
 
     fn bounds(&self) -> Aabb {
         self.local_aabb()
+    }
+
+    #[inline(always)]
+    fn keep_reached<W: Lanes<LANES>>(&self, sides: W, planes: &Planes<W>, _margin: Real) -> W {
+        let end = Vec3::new(0.0, self.half_length(), 0.0);
+        planes.keep_low(sides, &[-end, end], self.radius())
     }
 
     fn touch_group(

@@ -9,7 +9,7 @@
 //! not depend on its neighbours in the group nor on the instructions that the machine has.
 
 use super::polyhedron::Polyhedron;
-use super::triangle::Frame;
+use super::triangle::{Frame, Reach, Solid};
 use crate::math::{Aabb, Mat3, Real, Vec3, abs3};
 use crate::shape::{Facet, LEAF as LANES};
 use crate::simd::{KernelOfEight, LaneVec3, Lanes, Number, run_eight};
@@ -21,10 +21,11 @@ pub(super) const BACKWARD: Real = -0.7;
 /// What a triangle has to be near to.
 pub(super) struct Near<'a> {
     pub(super) frame: &'a Frame,
-    /// The box around the shape, margin included, in the frame of the mesh.
-    pub(super) aabb: Aabb,
-    /// The same in the frame of the shape.
+    pub(super) reach: &'a Reach,
+    /// The box around the shape, margin included, in the frame of the shape.
     pub(super) bounds: Aabb,
+    /// How large that box is: what rounding is relative to.
+    pub(super) size: Real,
     /// A point inside the shape, in the frame of the mesh.
     pub(super) center: Vec3,
     /// Triangles seen from behind are left out.
@@ -52,23 +53,45 @@ impl Near<'_> {
 
     /// For each triangle on which side of it the shape is (1 in front, −1 behind), 0 if it is out of reach.
     #[inline(always)]
-    pub(super) fn sides<W: Number>(&self, corners: &[LaneVec3<W>; 3]) -> W {
-        let [a, b, c] = corners;
-        let normal = (*b - *a).cross(&(*c - *a));
+    pub(super) fn sides<W: Lanes<LANES>>(&self, solid: &impl Solid, corners: &[LaneVec3<W>; 3]) -> W {
+        let [a, b, c] = from_position(corners, &LaneVec3::splat(self.frame.position));
+        let normal = (b - a).cross(&(c - a));
         let length = normal.dot(&normal).sqrt();
-        let height = normal.dot(&(LaneVec3::splat(self.center) - *a));
+        let height = normal.dot(&(LaneVec3::splat(self.center - self.frame.position) - a));
         let (behind, other) = if self.one_sided { (-self.behind, 0.0) } else { (0.0, -1.0) };
         let sides = height.if_at_least(W::splat(behind) * length, W::splat(1.0), W::splat(other));
-        let sides = keep_overlapping(sides, corners, &self.aabb);
-        let local = turn_corners(&self.frame.inverse, &from_position(corners, &LaneVec3::splat(self.frame.position)));
+        let local = turn_corners(&self.frame.inverse, &[a, b, c]);
         let sides = keep_overlapping(sides, &local, &self.bounds);
-        // The lowest corner of the bounds over the plane.
+        if sides.abs().positive() == 0 {
+            return sides;
+        }
         let normal = turn(&self.frame.inverse, &normal);
-        let half = self.bounds.half_extents() * (1.0 + Self::SLACK);
-        let reach =
-            normal.x.abs() * W::splat(half.x) + normal.y.abs() * W::splat(half.y) + normal.z.abs() * W::splat(half.z);
-        let height = normal.dot(&(LaneVec3::splat(self.bounds.center()) - local[0])) * sides;
-        reach.if_at_least(height, sides, W::ZERO)
+        let reached = self.reach.margin + Self::SLACK * self.size;
+        let planes = Planes { corners: local, normal: normal.scale(sides), gap: W::splat(reached) * length, length };
+        solid.keep_reached(sides, &planes, self.reach.margin)
+    }
+}
+
+/// Triangles in the frame of the shape, and their planes.
+pub(super) struct Planes<W> {
+    pub(super) corners: [LaneVec3<W>; 3],
+    /// Towards the side of the shape, as long as twice the triangle's area.
+    normal: LaneVec3<W>,
+    length: W,
+    /// The most that the lowest point may be above the plane, times that length.
+    gap: W,
+}
+
+impl<W: Number> Planes<W> {
+    /// Zero where the lowest of some points, grown by a radius, is too far above the plane.
+    #[inline(always)]
+    pub(super) fn keep_low(&self, sides: W, points: &[Vec3], radius: Real) -> W {
+        let mut lowest = W::splat(Real::MAX);
+        for &point in points {
+            lowest = LaneVec3::splat(point).dot(&self.normal).min(lowest);
+        }
+        let height = lowest - self.normal.dot(&self.corners[0]) - W::splat(radius) * self.length;
+        self.gap.if_at_least(height, sides, W::ZERO)
     }
 }
 
@@ -332,7 +355,11 @@ impl<W: Number> Best<W> {
             let axis = outward.scale(W::splat(-1.0) / squared.sqrt());
             let separation = axis.dot(&(LaneVec3::splat(solid.vertices[twins[0].origin as usize]) - of.start));
             let separation = valid.if_positive(separation, W::splat(-Real::MAX));
-            self.offer((first + index) as Real, axis.dot(&of.normal), separation);
+            // Neither a gap nor better than what is known, in any lane: most are not.
+            let useful = (self.separation + W::splat(self.bias)).min(W::splat(self.margin));
+            if separation.if_above(useful, W::splat(1.0), W::ZERO).positive() != 0 {
+                self.offer((first + index) as Real, axis.dot(&of.normal), separation);
+            }
         }
     }
 }

@@ -95,25 +95,21 @@ fn sifting_keeps_what_overlaps_both_boxes_on_the_right_side() {
         let frame = frame_of(&pose);
         let bounds = Aabb::from_center(Vec3::ZERO, Vec3::new(0.5, 0.2, 0.3));
         let one_sided = round % 2 == 0;
-        let near = Near {
-            frame: &frame,
-            aabb: bounds.transform(&pose),
-            bounds,
-            center: pose.position,
-            one_sided,
-            behind: 0.002,
-        };
+        let cuboid = CuboidFeatures::new(&Cuboid::new(Vec3::new(0.49, 0.19, 0.29)).unwrap());
+        let solid = Solids::new(cuboid.view());
+        let reach = Reach { margin: 0.01, scale: 0.01, second_look: false };
+        let near =
+            Near { frame: &frame, reach: &reach, bounds, size: 0.5, center: pose.position, one_sided, behind: 0.002 };
         for first in (0..count).step_by(LANES) {
             let leaf = LANES.min(count - first);
-            let sides = near.sides(&mesh.corners_of_leaf::<Wide<LANES>>(first, leaf)).to_array();
+            let sides = near.sides(&solid, &mesh.corners_of_leaf::<Wide<LANES>>(first, leaf)).to_array();
             for (index, side) in (first..first + leaf).zip(sides) {
                 let (corners, normal) = (mesh.corners(index), mesh.facet(index).normal());
                 let height = normal.dot(pose.position - corners[0]);
                 let turned = frame.inverse * normal;
-                let reach = turned.abs().dot(bounds.half_extents());
+                let reach = turned.abs().dot(Vec3::new(0.49, 0.19, 0.29)) + 0.01;
                 let local = corners.map(|corner| frame.inverse * (corner - frame.position));
-                let near_by =
-                    Aabb::from_points(corners).overlaps(&near.aabb) && Aabb::from_points(local).overlaps(&near.bounds);
+                let near_by = Aabb::from_points(local).overlaps(&near.bounds);
                 let front = height >= if one_sided { -near.behind } else { 0.0 };
                 let back = if one_sided { 0.0 } else { -1.0 };
                 let expected = if front { 1.0 } else { back };
@@ -157,7 +153,9 @@ fn passing_over_boxes_loses_no_triangle() {
         let frame = frame_of(&pose);
         let bounds = Aabb::from_center(Vec3::new(0.1, 0.3, 0.0), Vec3::new(0.1, 2.0, 0.1));
         let aabb = bounds.transform(&pose);
-        let near = Near { frame: &frame, aabb, bounds, center: pose.position, one_sided: true, behind: 0.0 };
+        let reach = Reach { margin: 0.0, scale: 0.01, second_look: false };
+        let center = pose.position;
+        let near = Near { frame: &frame, reach: &reach, bounds, size: 2.3, center, one_sided: true, behind: 0.0 };
         let (mut all, mut some) =
             (Collect { near: None, found: Vec::new() }, Collect { near: Some(&near), found: Vec::new() });
         mesh.walk(&aabb, &mut all);

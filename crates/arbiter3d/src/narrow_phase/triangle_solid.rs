@@ -17,9 +17,10 @@ use super::polyhedron::Polyhedron;
 use super::triangle::{Frame, Group, Reach, Solid, Triangle, feature_id, parallel_part};
 #[cfg(test)]
 use super::triangle_lanes::BACKWARD;
-use super::triangle_lanes::{EdgeSearch, FaceSearch, Overlaps, Search};
+use super::triangle_lanes::{EdgeSearch, FaceSearch, Overlaps, Planes, Search};
 use crate::math::{Aabb, Real, Vec3, clamp, max, max3, min, min3};
 use crate::shape::{Facet, LEAF as LANES, TriangleMesh};
+use crate::simd::{LaneVec3, Lanes};
 
 /// An edge, or the face, of a triangle lies level with its highest corner below this sine.
 const LEVEL_SINE: Real = 0.02;
@@ -115,6 +116,21 @@ impl Solid for Solids<'_> {
 
     fn bounds(&self) -> Aabb {
         self.bounds
+    }
+
+    #[inline(always)]
+    fn keep_reached<W: Lanes<LANES>>(&self, sides: W, planes: &Planes<W>, margin: Real) -> W {
+        let mut sides = planes.keep_low(sides, self.features.vertices, 0.0);
+        if sides.abs().positive() == 0 {
+            return sides;
+        }
+        let [a, b, c] = &planes.corners;
+        for plane in self.features.planes {
+            let outward = LaneVec3::splat(plane.normal);
+            let lowest = outward.dot(a).min(outward.dot(b).min(outward.dot(c)));
+            sides = W::splat(plane.offset + margin).if_at_least(lowest, sides, W::ZERO);
+        }
+        sides
     }
 
     fn touch_group(

@@ -249,27 +249,33 @@ impl TriangleMesh {
     #[inline(always)]
     pub(crate) fn corners_of_leaf<W: Lanes<LEAF>>(&self, first: usize, count: usize) -> [LaneVec3<W>; 3] {
         let around = &self.surroundings[first..first + count];
-        let mut quads = [[&[0.0; 4]; LEAF]; 3];
-        for lane in 0..LEAF {
-            let triangle = &self.triangles[around[lane.min(count - 1)].id as usize];
-            for (quads, &vertex) in quads.iter_mut().zip(triangle) {
-                quads[lane] = self.quad(vertex);
-            }
+        let mut triangles = [&[0; 3]; LEAF];
+        for (lane, triangle) in triangles.iter_mut().enumerate() {
+            let id = around[lane.min(count - 1)].id as usize;
+            debug_assert!(id < self.triangles.len());
+            // SAFETY: the ids are the numbers of the triangles in another order, and neither list changes.
+            *triangle = unsafe { self.triangles.get_unchecked(id) };
         }
         let mut corners = [LaneVec3::ZERO; 3];
-        for (corner, quads) in corners.iter_mut().zip(&quads) {
-            let [x, y, z, _] = W::load(quads);
+        for (i, corner) in corners.iter_mut().enumerate() {
+            let mut quads = [&[0.0; 4]; LEAF];
+            for (quad, triangle) in quads.iter_mut().zip(&triangles) {
+                *quad = self.quad(triangle[i]);
+            }
+            let [x, y, z, _] = W::load(&quads);
             *corner = LaneVec3 { x, y, z };
         }
         corners
     }
 
-    /// The coordinates of a vertex and one number more.
+    /// The coordinates of a vertex of a triangle and one number more.
     #[inline(always)]
     fn quad(&self, vertex: u32) -> &Quad {
-        let pair = &self.vertices[vertex as usize..vertex as usize + 2];
-        // SAFETY: two vertices are six numbers in a row, of which these are the first four.
-        unsafe { &*pair.as_ptr().cast::<Quad>() }
+        debug_assert!(vertex as usize + 1 < self.vertices.len());
+        // SAFETY: `check` has found that all corners are vertices of the user's, after which one more stands, and neither list
+        // changes: two vertices are six numbers in a row, of which these are the first four. To check it at each of the 24
+        // corners of a leaf took as long as all that is computed of them.
+        unsafe { &*self.vertices.as_ptr().add(vertex as usize).cast::<Quad>() }
     }
 
     /// What is known about the edges and corners of a triangle by its internal number.
