@@ -13,6 +13,7 @@ mod mass;
 mod mesh;
 mod mesh_edges;
 mod mesh_tree;
+mod mesh_tree_builder;
 mod sphere;
 
 pub use capsule::Capsule;
@@ -20,8 +21,10 @@ pub use cuboid::Cuboid;
 pub use hull::{ConvexHull, HalfEdge, Plane};
 pub(crate) use hull_features::{BorderEdge, CornerGroup, FaceGroup, LANES};
 pub use mass::MassProperties;
-pub(crate) use mesh::{Facet, OCTET, Octet};
-pub use mesh::{MeshEdge, MeshNode, MeshRayHit, MeshSides, TriangleMesh};
+pub(crate) use mesh::Facet;
+pub use mesh::{MeshEdge, MeshRayHit, MeshSides, TriangleMesh};
+pub(crate) use mesh_edges::Surroundings;
+pub(crate) use mesh_tree::{LEAF, Leaves};
 pub use sphere::Sphere;
 
 use crate::math::{Aabb, Pose, Real, Vec3};
