@@ -19,9 +19,7 @@ use crate::math::Real;
 use crate::parallel::SharedSlice;
 use crate::simd::{Kernel, LaneRotation, LaneSymmetric, LaneVec3, Lanes, Number, Quad};
 use std::marker::PhantomData;
-
-/// Bodies that a thread takes at a time.
-pub(super) const BODIES_PER_BLOCK: usize = 128;
+use std::ops::Range;
 
 /// Spin below which its own torque is left out, radians a substep: the change of ω is that share of ω.
 const GYROSCOPIC_TURN: Real = 1e-5;
@@ -65,15 +63,16 @@ impl<'a> IntegrateTarget<'a> {
         }
     }
 
-    pub fn blocks(&self) -> usize {
-        self.awake.len().div_ceil(BODIES_PER_BLOCK)
+    /// How many groups of as many bodies as there are lanes.
+    pub fn groups_of(&self, lanes: usize) -> usize {
+        self.awake.len().div_ceil(lanes)
     }
 }
 
-/// Integrates one block of the list.
+/// Integrates some groups of the list.
 pub(super) struct IntegrateKernel<'a, W, const L: usize> {
     pub target: &'a IntegrateTarget<'a>,
-    pub block: usize,
+    pub groups: Range<usize>,
     pub phase: Integration,
     pub parameters: &'a IntegrateParameters,
     pub lanes: PhantomData<W>,
@@ -87,10 +86,10 @@ static NO_MASS: BodyMass = BodyMass::NONE;
 impl<W: Lanes<L>, const L: usize> Kernel for IntegrateKernel<'_, W, L> {
     #[inline(always)]
     fn run(self) {
-        let start = self.block * BODIES_PER_BLOCK;
-        let awake = &self.target.awake[start..(start + BODIES_PER_BLOCK).min(self.target.awake.len())];
+        let awake = self.target.awake;
+        let awake = &awake[self.groups.start * L..(self.groups.end * L).min(awake.len())];
         for bodies in awake.chunks(L) {
-            // SAFETY: a body stands in the list once, and this block alone has this part of the list.
+            // SAFETY: a body stands in the list once, and this run alone has this part of the list.
             unsafe {
                 match self.phase {
                     Integration::FirstVelocities => velocities::<W, L>(self.target, bodies, self.parameters, true),

@@ -21,7 +21,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// soft springs: to 3 cm, measured on 1,000 mixed bodies.
 const DEEPEST_REST: Real = 1.97;
 /// Bodies that a thread takes at a time.
-const BODIES_PER_BLOCK: usize = 128;
+const BODIES_PER_BLOCK: usize = 64;
 
 /// Rows whose contacts a thread looks at at a time.
 const ROWS_PER_BLOCK: usize = 512;
