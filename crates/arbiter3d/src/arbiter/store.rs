@@ -157,12 +157,17 @@ impl Hasher for IdHasher {
 /// A map whose keys are ids.
 pub(crate) type IdMap<K, V> = HashMap<K, V, BuildHasherDefault<IdHasher>>;
 
-/// An arbiter in the solving order: its place, and the generation by which one that has ended is told from its successor.
+/// An arbiter in the solving order: its place, the generation by which one that has ended is told from its successor, and its
+/// key, so that the order is kept without a look at the arbiters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Entry {
+    key: ArbiterKey,
     pub index: u32,
     generation: u32,
 }
+
+/// In place of a generation: no awake arbiter.
+const ASLEEP: u64 = u64::MAX;
 
 /// The pool of arbiters.
 #[derive(Debug, Default)]
@@ -170,6 +175,8 @@ pub(crate) struct ArbiterStore {
     /// Where generations start.
     tag: u32,
     arbiters: Vec<Arbiter>,
+    /// By place: the generation of an arbiter that is awake, else [`ASLEEP`].
+    awake: Vec<u64>,
     free: Vec<u32>,
     by_key: PlaceTable,
     /// First list entry of each body, by body index.
@@ -266,6 +273,7 @@ impl ArbiterStore {
             previous: [NONE; 2],
         };
         storage::push(&mut self.arbiters, arbiter);
+        storage::push(&mut self.awake, ASLEEP);
         // The free list has room for every place: else it would grow in the middle of a step.
         storage::reserve(&mut self.free, self.arbiters.len());
         index
@@ -277,6 +285,7 @@ impl ArbiterStore {
         debug_assert!(arbiter.alive);
         arbiter.alive = false;
         arbiter.awake = false;
+        self.awake[index as usize] = ASLEEP;
         let (key, body1, body2) = (arbiter.key, arbiter.body1.index, arbiter.body2.index);
         let arbiters = &self.arbiters;
         self.by_key.remove(key.hash(), index, |place| arbiters[place as usize].key.hash());
@@ -291,8 +300,10 @@ impl ArbiterStore {
         let arbiter = &mut self.arbiters[index as usize];
         if arbiter.awake != awake {
             arbiter.awake = awake;
+            let (key, generation) = (arbiter.key, arbiter.id.generation);
+            self.awake[index as usize] = if awake { u64::from(generation) } else { ASLEEP };
             if awake {
-                storage::push(&mut self.fresh, Entry { index, generation: arbiter.id.generation });
+                storage::push(&mut self.fresh, Entry { key, index, generation });
             } else {
                 self.stale = true;
             }
@@ -303,34 +314,35 @@ impl ArbiterStore {
     pub fn awake_by_key(&mut self) -> &[Entry] {
         self.fresh_peak.note(self.fresh.len());
         if self.stale || !self.fresh.is_empty() {
-            let arbiters = &self.arbiters;
-            let key = |entry: &Entry| arbiters[entry.index as usize].key;
-            let live = |entry: &&Entry| {
-                let arbiter = &arbiters[entry.index as usize];
-                arbiter.awake && arbiter.id.generation == entry.generation
-            };
-            self.fresh.retain(|entry| live(&entry));
-            self.fresh.sort_unstable_by_key(key);
-            self.merged.clear();
-            storage::reserve(&mut self.merged, self.sorted.len() + self.fresh.len());
-            let mut fresh = self.fresh.iter().peekable();
-            for entry in self.sorted.iter().filter(live) {
-                while let Some(new) = fresh.next_if(|new| key(new) <= key(entry)) {
-                    push_unique(&mut self.merged, *new);
-                }
-                push_unique(&mut self.merged, *entry);
-            }
-            for new in fresh {
-                push_unique(&mut self.merged, *new);
-            }
-            std::mem::swap(&mut self.sorted, &mut self.merged);
-            self.fresh.clear();
-            self.stale = false;
+            self.merge_fresh();
         }
         if let Some(count) = self.fresh_peak.end_step() {
             storage::shrink(&mut self.fresh, count);
         }
         &self.sorted
+    }
+
+    /// Merges the arbiters that have woken into the solving order, and drops those that sleep or have ended.
+    fn merge_fresh(&mut self) {
+        let awake = &self.awake;
+        let live = |entry: &&Entry| awake[entry.index as usize] == u64::from(entry.generation);
+        self.fresh.retain(|entry| live(&entry));
+        self.fresh.sort_unstable_by_key(|entry| entry.key);
+        self.merged.clear();
+        storage::reserve(&mut self.merged, self.sorted.len() + self.fresh.len());
+        let mut fresh = self.fresh.iter().peekable();
+        for entry in self.sorted.iter().filter(live) {
+            while let Some(new) = fresh.next_if(|new| new.key <= entry.key) {
+                push_unique(&mut self.merged, *new);
+            }
+            push_unique(&mut self.merged, *entry);
+        }
+        for new in fresh {
+            push_unique(&mut self.merged, *new);
+        }
+        std::mem::swap(&mut self.sorted, &mut self.merged);
+        self.fresh.clear();
+        self.stale = false;
     }
 
     /// Whether no arbiter is to be solved.

@@ -65,6 +65,15 @@ impl<'a, T> SharedSlice<'a, T> {
         }
     }
 
+    /// Asks for the part of an element that begins `offset` bytes into it.
+    #[inline(always)]
+    pub fn prefetch_bytes(&self, index: usize, offset: usize) {
+        if index < self.len && offset < size_of::<T>() {
+            // SAFETY: in bounds; not read.
+            crate::simd::prefetch(unsafe { &*self.start.add(index).cast::<std::mem::MaybeUninit<u8>>().add(offset) });
+        }
+    }
+
     /// A run of elements.
     ///
     /// # Safety

@@ -15,6 +15,7 @@
 //! Bodies are independent: as many as there are lanes are integrated together, in blocks on all threads.
 
 use super::bodies::{BodyMass, BodyMotion, BodyState, SolverBodies};
+use super::coloring::RowPlan;
 use crate::math::Real;
 use crate::parallel::SharedSlice;
 use crate::simd::{Kernel, LaneRotation, LaneSymmetric, LaneVec3, Lanes, Number, Quad};
@@ -49,17 +50,19 @@ pub(crate) struct IntegrateTarget<'a> {
     states: SharedSlice<'a, BodyState>,
     motions: SharedSlice<'a, BodyMotion>,
     masses: SharedSlice<'a, BodyMass>,
+    plan: &'a RowPlan,
 }
 
 impl<'a> IntegrateTarget<'a> {
     /// Integrates the bodies of a list in which each stands once.
-    pub fn new(awake: &'a [u32], bodies: &'a mut SolverBodies) -> Self {
+    pub fn new(awake: &'a [u32], bodies: &'a mut SolverBodies, plan: &'a RowPlan) -> Self {
         assert!(awake.iter().all(|&body| (body as usize) < bodies.states.len()), "the list is of other bodies");
         Self {
             awake,
             states: SharedSlice::new(&mut bodies.states),
             motions: SharedSlice::new(&mut bodies.motions),
             masses: SharedSlice::new(&mut bodies.masses),
+            plan,
         }
     }
 
@@ -168,6 +171,10 @@ unsafe fn velocities<W: Lanes<L>, const L: usize>(
                 (quads[0], quads[1]) = (state[0][lane], state[1][lane]);
                 let quads = target.motions.get_unchecked_mut(body as usize).quads_mut();
                 (quads[0], quads[1], quads[4]) = (free_linear[lane], free_angular[lane], residual[lane]);
+            }
+            if first && target.plan.constrains(body as usize) {
+                // SAFETY: as above.
+                unsafe { target.states.get_unchecked_mut(body as usize) }.constrained = 1.0;
             }
         }
     }

@@ -261,7 +261,7 @@ impl World {
     fn plan_rows(&mut self) {
         self.arbiters.awake_by_key();
         let (order, arbiters) = self.arbiters.order_and_slots_mut();
-        self.plan.build(order, arbiters, &mut self.solver_bodies);
+        self.plan.build(order, arbiters, &self.solver_bodies, &mut self.pool);
     }
 
     fn prepare_rows(&mut self) {
@@ -314,7 +314,7 @@ impl World {
     }
 
     fn integrate(&mut self, phase: Integration, parameters: &IntegrateParameters) {
-        let target = IntegrateTarget::new(&self.scratch.sorted_awake, &mut self.solver_bodies);
+        let target = IntegrateTarget::new(&self.scratch.sorted_awake, &mut self.solver_bodies, &self.plan);
         self.solver.integrate(phase, target, parameters, &mut self.pool);
     }
 
