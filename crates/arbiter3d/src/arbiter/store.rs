@@ -240,6 +240,36 @@ impl ArbiterStore {
         self.by_key.find(key.hash(), |place| self.arbiters[place as usize].key == key)
     }
 
+    /// Asks for what making an arbiter of this key, the `nth` from now on, will touch.
+    #[inline]
+    pub fn prefetch_new(&self, key: ArbiterKey, bodies: [u32; 2], nth: usize) {
+        self.by_key.prefetch(key.hash());
+        let place = self.free.len().checked_sub(nth + 1).and_then(|at| self.arbiters.get(self.free[at] as usize));
+        let heads = bodies.map(|body| self.heads.get(body as usize).copied().unwrap_or(NONE));
+        let heads = heads.map(|head| self.arbiters.get((head >> 1) as usize));
+        for arbiter in [place, heads[0], heads[1]].into_iter().flatten() {
+            crate::simd::prefetch(arbiter);
+        }
+    }
+
+    /// Asks for the names and links of an arbiter.
+    #[inline]
+    pub fn prefetch_links(&self, index: u32) {
+        crate::simd::prefetch(&self.arbiters[index as usize]);
+    }
+
+    /// Asks for what ending an arbiter will touch, once its links are there.
+    #[inline]
+    pub fn prefetch_end(&self, index: u32) {
+        let arbiter = &self.arbiters[index as usize];
+        self.by_key.prefetch(arbiter.key.hash());
+        for edge in arbiter.next.into_iter().chain(arbiter.previous) {
+            if let Some(neighbour) = self.arbiters.get((edge >> 1) as usize) {
+                crate::simd::prefetch(neighbour);
+            }
+        }
+    }
+
     /// Makes an arbiter; the key must be free and the bodies different.
     pub fn create(&mut self, key: ArbiterKey, body1: BodyId, body2: BodyId) -> u32 {
         let index = self.free.pop().unwrap_or_else(|| self.add_place(key, body1, body2));

@@ -227,6 +227,15 @@ impl StagePool {
         assert!(!shared.panicked.load(Ordering::Relaxed), "a solver thread panicked: this is a bug in arbiter3d");
     }
 
+    /// As [`Self::run_ranges`], in one piece if there is no pool.
+    pub fn run_ranges_of<F: Fn(Range<usize>) + Sync>(pool: Option<&mut Self>, count: usize, least: usize, stage: F) {
+        match pool {
+            Some(pool) => pool.run_ranges(count, least, stage),
+            None if count > 0 => stage(0..count),
+            None => {}
+        }
+    }
+
     fn next_epoch(&mut self) {
         self.epoch = self.epoch.wrapping_add(1);
     }

@@ -33,6 +33,14 @@ impl<'a, T> SharedSlice<'a, T> {
         unsafe { &mut *self.start.add(index) }
     }
 
+    /// Where an element is, for writing single fields of it: the references of [`Self::get_mut`] would claim it whole.
+    #[inline(always)]
+    pub fn at(&self, index: usize) -> *mut T {
+        assert!(index < self.len, "index {index} of a shared slice of {}", self.len);
+        // SAFETY: in bounds.
+        unsafe { self.start.add(index) }
+    }
+
     /// One element to read, in bounds by construction.
     ///
     /// # Safety
