@@ -40,6 +40,14 @@ impl PlaceTable {
         self.slot_of(hash, is_wanted).map(|slot| self.slots[slot])
     }
 
+    /// Asks for the slot of a hash to be brought into the cache.
+    #[inline]
+    pub fn prefetch(&self, hash: u64) {
+        if let Some(slot) = self.slots.len().checked_sub(1).and_then(|mask| self.slots.get(hash as usize & mask)) {
+            crate::simd::prefetch(slot);
+        }
+    }
+
     /// Adds a place that is not there yet.
     pub fn insert(&mut self, hash: u64, place: u32, hash_of: impl Fn(u32) -> u64) {
         self.len += 1;

@@ -157,12 +157,17 @@ impl Hasher for IdHasher {
 /// A map whose keys are ids.
 pub(crate) type IdMap<K, V> = HashMap<K, V, BuildHasherDefault<IdHasher>>;
 
-/// An arbiter in the solving order: its place, and the generation by which one that has ended is told from its successor.
+/// An arbiter in the solving order: its place, the generation by which one that has ended is told from its successor, and its
+/// key, so that the order is kept without a look at the arbiters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Entry {
+    key: ArbiterKey,
     pub index: u32,
     generation: u32,
 }
+
+/// In place of a generation: no awake arbiter.
+const ASLEEP: u64 = u64::MAX;
 
 /// The pool of arbiters.
 #[derive(Debug, Default)]
@@ -170,6 +175,8 @@ pub(crate) struct ArbiterStore {
     /// Where generations start.
     tag: u32,
     arbiters: Vec<Arbiter>,
+    /// By place: the generation of an arbiter that is awake, else [`ASLEEP`].
+    awake: Vec<u64>,
     free: Vec<u32>,
     by_key: PlaceTable,
     /// First list entry of each body, by body index.
@@ -233,6 +240,36 @@ impl ArbiterStore {
         self.by_key.find(key.hash(), |place| self.arbiters[place as usize].key == key)
     }
 
+    /// Asks for what making an arbiter of this key, the `nth` from now on, will touch.
+    #[inline]
+    pub fn prefetch_new(&self, key: ArbiterKey, bodies: [u32; 2], nth: usize) {
+        self.by_key.prefetch(key.hash());
+        let place = self.free.len().checked_sub(nth + 1).and_then(|at| self.arbiters.get(self.free[at] as usize));
+        let heads = bodies.map(|body| self.heads.get(body as usize).copied().unwrap_or(NONE));
+        let heads = heads.map(|head| self.arbiters.get((head >> 1) as usize));
+        for arbiter in [place, heads[0], heads[1]].into_iter().flatten() {
+            crate::simd::prefetch(arbiter);
+        }
+    }
+
+    /// Asks for the names and links of an arbiter.
+    #[inline]
+    pub fn prefetch_links(&self, index: u32) {
+        crate::simd::prefetch(&self.arbiters[index as usize]);
+    }
+
+    /// Asks for what ending an arbiter will touch, once its links are there.
+    #[inline]
+    pub fn prefetch_end(&self, index: u32) {
+        let arbiter = &self.arbiters[index as usize];
+        self.by_key.prefetch(arbiter.key.hash());
+        for edge in arbiter.next.into_iter().chain(arbiter.previous) {
+            if let Some(neighbour) = self.arbiters.get((edge >> 1) as usize) {
+                crate::simd::prefetch(neighbour);
+            }
+        }
+    }
+
     /// Makes an arbiter; the key must be free and the bodies different.
     pub fn create(&mut self, key: ArbiterKey, body1: BodyId, body2: BodyId) -> u32 {
         let index = self.free.pop().unwrap_or_else(|| self.add_place(key, body1, body2));
@@ -266,6 +303,7 @@ impl ArbiterStore {
             previous: [NONE; 2],
         };
         storage::push(&mut self.arbiters, arbiter);
+        storage::push(&mut self.awake, ASLEEP);
         // The free list has room for every place: else it would grow in the middle of a step.
         storage::reserve(&mut self.free, self.arbiters.len());
         index
@@ -277,6 +315,7 @@ impl ArbiterStore {
         debug_assert!(arbiter.alive);
         arbiter.alive = false;
         arbiter.awake = false;
+        self.awake[index as usize] = ASLEEP;
         let (key, body1, body2) = (arbiter.key, arbiter.body1.index, arbiter.body2.index);
         let arbiters = &self.arbiters;
         self.by_key.remove(key.hash(), index, |place| arbiters[place as usize].key.hash());
@@ -291,8 +330,10 @@ impl ArbiterStore {
         let arbiter = &mut self.arbiters[index as usize];
         if arbiter.awake != awake {
             arbiter.awake = awake;
+            let (key, generation) = (arbiter.key, arbiter.id.generation);
+            self.awake[index as usize] = if awake { u64::from(generation) } else { ASLEEP };
             if awake {
-                storage::push(&mut self.fresh, Entry { index, generation: arbiter.id.generation });
+                storage::push(&mut self.fresh, Entry { key, index, generation });
             } else {
                 self.stale = true;
             }
@@ -303,34 +344,35 @@ impl ArbiterStore {
     pub fn awake_by_key(&mut self) -> &[Entry] {
         self.fresh_peak.note(self.fresh.len());
         if self.stale || !self.fresh.is_empty() {
-            let arbiters = &self.arbiters;
-            let key = |entry: &Entry| arbiters[entry.index as usize].key;
-            let live = |entry: &&Entry| {
-                let arbiter = &arbiters[entry.index as usize];
-                arbiter.awake && arbiter.id.generation == entry.generation
-            };
-            self.fresh.retain(|entry| live(&entry));
-            self.fresh.sort_unstable_by_key(key);
-            self.merged.clear();
-            storage::reserve(&mut self.merged, self.sorted.len() + self.fresh.len());
-            let mut fresh = self.fresh.iter().peekable();
-            for entry in self.sorted.iter().filter(live) {
-                while let Some(new) = fresh.next_if(|new| key(new) <= key(entry)) {
-                    push_unique(&mut self.merged, *new);
-                }
-                push_unique(&mut self.merged, *entry);
-            }
-            for new in fresh {
-                push_unique(&mut self.merged, *new);
-            }
-            std::mem::swap(&mut self.sorted, &mut self.merged);
-            self.fresh.clear();
-            self.stale = false;
+            self.merge_fresh();
         }
         if let Some(count) = self.fresh_peak.end_step() {
             storage::shrink(&mut self.fresh, count);
         }
         &self.sorted
+    }
+
+    /// Merges the arbiters that have woken into the solving order, and drops those that sleep or have ended.
+    fn merge_fresh(&mut self) {
+        let awake = &self.awake;
+        let live = |entry: &&Entry| awake[entry.index as usize] == u64::from(entry.generation);
+        self.fresh.retain(|entry| live(&entry));
+        self.fresh.sort_unstable_by_key(|entry| entry.key);
+        self.merged.clear();
+        storage::reserve(&mut self.merged, self.sorted.len() + self.fresh.len());
+        let mut fresh = self.fresh.iter().peekable();
+        for entry in self.sorted.iter().filter(live) {
+            while let Some(new) = fresh.next_if(|new| new.key <= entry.key) {
+                push_unique(&mut self.merged, *new);
+            }
+            push_unique(&mut self.merged, *entry);
+        }
+        for new in fresh {
+            push_unique(&mut self.merged, *new);
+        }
+        std::mem::swap(&mut self.sorted, &mut self.merged);
+        self.fresh.clear();
+        self.stale = false;
     }
 
     /// Whether no arbiter is to be solved.

@@ -25,7 +25,7 @@ pub use pair_set::PairSet;
 pub use tree::DynamicTree;
 
 use crate::math::{Aabb, Real, Vec3};
-use crate::parallel::SharedSlice;
+use crate::parallel::{SharedSlice, StagePool};
 use pair_set::pair_key;
 use tree::{Leaf, LinkPair, PairSearch};
 
@@ -169,9 +169,9 @@ impl BroadPhase {
     }
 
     /// Brings the tree up to date with what [`Boxes::update`] has moved: `moved` are the shapes, in any order.
-    pub fn lift(&mut self, moved: &[u32]) {
-        let leaves = moved.iter().map(|&shape| self.proxies[shape as usize].leaf);
-        self.moving.lift_leaves(leaves);
+    pub fn lift(&mut self, moved: &[u32], pool: Option<&mut StagePool>) {
+        let proxies = &self.proxies;
+        self.moving.lift_leaves(moved.len(), |at| proxies[moved[at] as usize].leaf, pool);
     }
 
     /// Has the next search find the pairs of a shape anew, though it has not moved: its filter has changed, say.
@@ -214,7 +214,7 @@ impl BroadPhase {
         for part in self.work() {
             self.pairs_of(part, &filter, |a, b| out.push((a, b)));
         }
-        self.finish(out);
+        self.finish(out, None);
     }
 
     /// Tightens the trees and cuts the search into about `parts` independent parts a pair of trees.
@@ -268,10 +268,12 @@ impl BroadPhase {
     }
 
     /// Sorts what all parts have found and forgets what has moved.
-    pub fn finish(&mut self, out: &mut [(u32, u32)]) {
+    pub fn finish(&mut self, out: &mut [(u32, u32)], pool: Option<&mut StagePool>) {
         out.sort_unstable_by_key(|&(a, b)| pair_key(a, b));
-        self.fixed.clear_marks(|_, _| ());
-        self.moving.clear_marks(|leaf, aabb| self.seen[leaf] = *aabb);
+        self.fixed.clear_marks(|_, _| (), None);
+        let seen = SharedSlice::new(&mut self.seen);
+        // SAFETY: each leaf is visited once.
+        self.moving.clear_marks(|leaf, aabb| unsafe { *seen.get_mut(leaf) = *aabb }, pool);
     }
 
     /// Calls `visit` with each static shape whose fat box overlaps `aabb`.

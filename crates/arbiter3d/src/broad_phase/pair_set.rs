@@ -49,6 +49,16 @@ impl PairSet {
         self.get(a, b).is_some()
     }
 
+    /// Asks for the slots of a pair to be brought into the cache.
+    #[inline]
+    pub fn prefetch(&self, a: u32, b: u32) {
+        if self.len > 0 {
+            let slot = self.home(pair_key(a, b));
+            crate::simd::prefetch(&self.keys[slot]);
+            crate::simd::prefetch(&self.values[slot]);
+        }
+    }
+
     /// Stores a value for a pair and returns the one it had before.
     pub fn insert(&mut self, a: u32, b: u32, value: u32) -> Option<u32> {
         let key = pair_key(a, b);

@@ -140,6 +140,7 @@ fn boxes_lifted_together_are_as_boxes_moved_one_by_one() {
         one_by_one.add(shape, kind, Aabb::from_center(random.vector() * 5.0, Vec3::splat(0.5)));
     }
     let mut together = one_by_one.clone();
+    let mut pool = StagePool::new(3);
     let (mut expected, mut found) = (Vec::new(), Vec::new());
     for round in 0..30 {
         let share = if round % 3 == 0 { 50 } else { 2 };
@@ -155,7 +156,7 @@ fn boxes_lifted_together_are_as_boxes_moved_one_by_one() {
                 }
             }
         }
-        together.lift(&moved);
+        together.lift(&moved, Some(&mut pool));
         together.validate().unwrap();
         one_by_one.find_pairs(|_, _, _| true, &mut expected);
         together.find_pairs(|_, _, _| true, &mut found);
@@ -218,7 +219,7 @@ fn the_cut_of_the_work_does_not_show() {
     for part in cut.work().iter().rev() {
         cut.pairs_of(part, |_, _, _| true, |a, b| found.push((a, b)));
     }
-    cut.finish(&mut found);
+    cut.finish(&mut found, Some(&mut StagePool::new(2)));
     assert!(expected.len() > 500);
     assert_eq!(found, expected);
 }

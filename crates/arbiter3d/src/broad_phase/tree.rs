@@ -18,6 +18,7 @@
 //! child's box holds everything below it; stored heights are exact and at most [`MAX_HEIGHT`]; above a marked leaf every
 //! link is marked. The tree is valid after every call: queries may come between any two edits.
 
+mod bulk;
 mod overlap;
 mod query;
 mod rebuild;
@@ -35,8 +36,6 @@ pub(crate) const MAX_HEIGHT: u32 = 64;
 const LEAF: u32 = 1 << 31;
 const MOVED: u32 = 1 << 30;
 const LOOSE: u32 = 1 << 29;
-/// From one leaf in so many on, moved leaves are lifted together.
-const BULK_SHARE: usize = 8;
 const FLAGS: u32 = MOVED | LOOSE;
 const INDEX: u32 = LOOSE - 1;
 
@@ -160,8 +159,8 @@ pub struct DynamicTree {
     inserted: usize,
     /// Marked inner nodes, parents first. Kept to be reused.
     marked: Vec<u32>,
-    /// All inner nodes, parents first; empty when the tree has changed its form since they were listed.
-    order: Vec<u32>,
+    /// All inner nodes in an order for threads.
+    order: bulk::Order,
     /// Whether the boxes above all leaves are tight.
     tight: bool,
     /// Subtrees to be joined by a rebuild. Kept to be reused.
@@ -185,7 +184,7 @@ impl DynamicTree {
             free_leaves: Vec::new(),
             inserted: 0,
             marked: Vec::new(),
-            order: Vec::new(),
+            order: bulk::Order::default(),
             tight: true,
             build: rebuild::Buffers::default(),
         }
@@ -293,42 +292,6 @@ impl DynamicTree {
         &mut self.leaves
     }
 
-    /// Brings the tree up to date with the boxes of the leaves listed, and marks them.
-    ///
-    /// Few are lifted one by one. For many, each hands its box to its node, and one pass over all nodes from the bottom up
-    /// makes all boxes tight.
-    pub(super) fn lift_leaves(&mut self, leaves: impl ExactSizeIterator<Item = u32>) {
-        if leaves.len() * BULK_SHARE < self.len() || self.len() < 3 {
-            leaves.for_each(|leaf| self.lift_leaf(leaf));
-            return;
-        }
-        for leaf in leaves {
-            let Leaf { aabb, parent, .. } = self.leaves[leaf as usize];
-            if let Some((node, side)) = parent.split() {
-                let node = &mut self.nodes[node];
-                node.bounds[side] = aabb;
-                node.children[side].0 |= FLAGS;
-            }
-        }
-        if self.order.is_empty() {
-            let mut order = std::mem::take(&mut self.order);
-            self.list_inner_nodes(&mut order);
-            self.order = order;
-        }
-        for &index in self.order.iter().rev() {
-            let node = &self.nodes[index as usize];
-            let (aabb, flags, slot) = (node.aabb(), node.flags(), node.parent);
-            if let Some((parent, side)) = slot.split() {
-                let parent = &mut self.nodes[parent];
-                parent.bounds[side] = aabb;
-                parent.children[side].0 |= flags;
-            } else {
-                self.root.0 |= flags;
-            }
-        }
-        self.tight = true;
-    }
-
     /// Grows the ancestors of a leaf over its box, and marks it.
     #[inline]
     fn lift_leaf(&mut self, leaf: u32) {
@@ -379,27 +342,6 @@ impl DynamicTree {
         }
     }
 
-    /// Forgets all marks, and calls `visit` with each marked leaf and its box.
-    pub fn clear_marks(&mut self, mut visit: impl FnMut(usize, &Aabb)) {
-        self.collect_marked();
-        if self.is_empty() {
-            return;
-        }
-        if self.root.is_leaf() && self.root.is_moved() {
-            visit(self.root.index(), &self.leaves[self.root.index()].aabb);
-        }
-        self.root = self.root.without(MOVED);
-        for &index in &self.marked {
-            let node = &mut self.nodes[index as usize];
-            for (child, bounds) in node.children.iter_mut().zip(&node.bounds) {
-                if child.is_leaf() && child.is_moved() {
-                    visit(child.index(), bounds);
-                }
-                *child = child.without(MOVED);
-            }
-        }
-    }
-
     /// Lists the inner nodes with a moved leaf below, each before its children.
     fn collect_marked(&mut self) {
         self.marked.clear();
@@ -420,13 +362,6 @@ impl DynamicTree {
     /// All inner nodes, parents first. For checks and statistics: allocates.
     fn inner_nodes(&self) -> Vec<u32> {
         let mut nodes = Vec::new();
-        self.list_inner_nodes(&mut nodes);
-        nodes
-    }
-
-    /// Replaces `nodes` by all inner nodes, parents first.
-    fn list_inner_nodes(&self, nodes: &mut Vec<u32>) {
-        nodes.clear();
         if !self.is_empty() && !self.root.is_leaf() {
             nodes.push(self.root.index() as u32);
         }
@@ -436,6 +371,7 @@ impl DynamicTree {
             nodes.extend(children.iter().filter(|child| !child.is_leaf()).map(|child| child.index() as u32));
             next += 1;
         }
+        nodes
     }
 
     /// The place whose subtree should become the sibling of a new box.
@@ -634,7 +570,7 @@ impl DynamicTree {
                 }
             }
         }
-        check(self.order.is_empty() || self.order == inner, || "the list of nodes is out of date".into())?;
+        check(self.order.is_stale() || self.order.holds(&inner), || "the list of nodes is out of date".into())?;
         check(leaves == self.len(), || format!("{leaves} leaves in the tree, {} in use", self.len()))?;
         check(inner.len() == self.nodes.len() - self.free_nodes.len(), || "lost nodes".into())?;
         check(inner.len() + 1 == leaves.max(1), || format!("{} nodes for {leaves} leaves", inner.len()))?;

@@ -33,6 +33,14 @@ impl<'a, T> SharedSlice<'a, T> {
         unsafe { &mut *self.start.add(index) }
     }
 
+    /// Where an element is, for writing single fields of it: the references of [`Self::get_mut`] would claim it whole.
+    #[inline(always)]
+    pub fn at(&self, index: usize) -> *mut T {
+        assert!(index < self.len, "index {index} of a shared slice of {}", self.len);
+        // SAFETY: in bounds.
+        unsafe { self.start.add(index) }
+    }
+
     /// One element to read, in bounds by construction.
     ///
     /// # Safety
@@ -62,6 +70,15 @@ impl<'a, T> SharedSlice<'a, T> {
         if index < self.len {
             // SAFETY: in bounds; not read.
             crate::simd::prefetch(unsafe { &*self.start.add(index).cast::<std::mem::MaybeUninit<T>>() });
+        }
+    }
+
+    /// Asks for the part of an element that begins `offset` bytes into it.
+    #[inline(always)]
+    pub fn prefetch_bytes(&self, index: usize, offset: usize) {
+        if index < self.len && offset < size_of::<T>() {
+            // SAFETY: in bounds; not read.
+            crate::simd::prefetch(unsafe { &*self.start.add(index).cast::<std::mem::MaybeUninit<u8>>().add(offset) });
         }
     }
 

@@ -6,13 +6,16 @@
 //! colours are solved last, so that the ground has the final say. A row that finds no colour (a body with more than
 //! [`DYNAMIC_COLORS`] dynamic neighbours) goes to the overflow, solved one row at a time before the rest.
 //!
-//! The colours are made anew each step: 15,000 rows take about 0.1 ms, and the result depends on the contacts alone, not on
-//! how they came about.
+//! The colours are made anew each step, so that they depend on the contacts alone, not on how these came about. Each colour
+//! depends on those given before: one thread gives them all. So threads first gather what that needs in short records, in key
+//! order: then 15,000 rows take 0.05 ms.
 
 use super::bodies::SolverBodies;
-use crate::arbiter::{Arbiter, Entry, ONE_NORMAL, SLOTS};
+use crate::arbiter::{Arbiter, ContactData, Entry, ONE_NORMAL, SLOTS};
 use crate::math::Vec3;
+use crate::parallel::{SharedSlice, StagePool};
 use crate::storage;
+use std::ops::Range;
 
 /// Colours for rows between two dynamic bodies.
 const DYNAMIC_COLORS: usize = 64;
@@ -25,6 +28,8 @@ const GROUPS: usize = 1 + DYNAMIC_COLORS + STATIC_COLORS;
 
 /// How many arbiters ahead of their use they are asked for.
 const PREFETCH_AHEAD: usize = 8;
+/// Arbiters that a thread looks at at a time at least.
+const LEAST_ARBITERS: usize = 128;
 
 /// Contacts of one arbiter that share a normal: what becomes one lane of a row.
 #[derive(Clone, Copy, Debug)]
@@ -44,14 +49,66 @@ impl RowSource {
     /// No row: an empty lane.
     pub const NONE: Self = Self { arbiter: u32::MAX, slots: 0, first: false, extra: false, color: 0 };
 
-    /// By its number of points: one, two, up to four.
-    fn class(self) -> usize {
-        match self.slots.count_ones() {
-            1 => 0,
-            2 => 1,
-            _ => 2,
+    /// By colour, then by its number of points: one, two, up to four.
+    #[inline(always)]
+    fn place(self) -> usize {
+        self.color as usize * CLASSES + (self.slots.count_ones() as usize - 1).min(CLASSES - 1)
+    }
+}
+
+/// What colouring needs to know of an arbiter.
+#[derive(Clone, Copy, Debug)]
+struct Record {
+    bodies: [u32; 2],
+    arbiter: u32,
+    /// The slots of each of its rows, four bits a row, the first lowest; zero after the last.
+    rows: u16,
+    /// Which bodies move.
+    moves: [bool; 2],
+    extra: bool,
+}
+
+impl Record {
+    const NONE: Self = Self { bodies: [0; 2], arbiter: 0, rows: 0, moves: [false; 2], extra: false };
+
+    #[inline(always)]
+    fn of(index: u32, arbiter: &Arbiter, bodies: &SolverBodies) -> Self {
+        let data = &arbiter.data;
+        let states = [arbiter.body1, arbiter.body2].map(|body| &bodies.states[body.index as usize]);
+        let extra = data.restitution > 0.0
+            || data.rolling_resistance > 0.0
+            || data.tangent_velocity != Vec3::ZERO
+            || states[0].locked != 0
+            || states[1].locked != 0;
+        Self {
+            bodies: [arbiter.body1.index, arbiter.body2.index],
+            arbiter: index,
+            rows: if data.flags & ONE_NORMAL == 0 { rows_of(data) } else { u16::from(data.usage_mask & 15) },
+            moves: states.map(|state| state.moves != 0),
+            extra,
         }
     }
+}
+
+/// Splits the slots of an arbiter into groups of equal normal and mode; each is a row.
+fn rows_of(data: &ContactData) -> u16 {
+    let mut left = data.usage_mask & 15;
+    let (mut rows, mut count) = (0, 0);
+    while left != 0 {
+        let lead = &data.slots[left.trailing_zeros() as usize];
+        let mut slots = 0;
+        for slot in 0..SLOTS {
+            let contact = &data.slots[slot];
+            let same = contact.remove == lead.remove && contact.normal == lead.normal;
+            slots |= u8::from(same && left >> slot & 1 == 1) << slot;
+        }
+        // A normal that is not equal to itself cannot occur (validated), but must not loop.
+        slots |= left & left.wrapping_neg();
+        left &= !slots;
+        rows |= u16::from(slots) << count;
+        count += 4;
+    }
+    rows
 }
 
 /// Rows with one, two or up to four points are kept apart, so that a sphere's contact does not carry four.
@@ -73,105 +130,90 @@ pub(crate) struct RowPlan {
     pub rows: Vec<RowSource>,
     pub groups: Vec<RowGroup>,
     unsorted: Vec<RowSource>,
-    /// Colours in use at each body, by body slot; zero between steps.
+    records: Vec<Record>,
+    /// Dynamic colours in use at each body, by body slot.
     used: Vec<u64>,
     /// Static colours in use at each body.
     fixed_rows: Vec<u8>,
+    /// Bodies of rows without a colour.
+    crowded: Vec<u32>,
 }
 
 impl RowPlan {
     /// Collects the rows of the awake arbiters and colours them.
-    pub fn build(&mut self, order: &[Entry], arbiters: &mut [Arbiter], bodies: &mut SolverBodies) {
-        self.used.resize(bodies.states.len(), 0);
-        self.fixed_rows.resize(bodies.states.len(), 0);
-        self.unsorted.clear();
-        storage::reserve(&mut self.unsorted, order.len());
-        for (i, &Entry { index, .. }) in order.iter().enumerate() {
-            if let Some(&Entry { index: later, .. }) = order.get(i + PREFETCH_AHEAD) {
-                crate::simd::prefetch(&arbiters[later as usize].body1);
-                crate::simd::prefetch(&arbiters[later as usize].data.usage_mask);
-            }
-            let arbiter = &mut arbiters[index as usize];
-            arbiter.data.mark_solved();
-            if arbiter.data.usage_mask & 15 != 0 {
-                self.add_rows(index, arbiter, bodies);
-            }
-        }
-        self.sort();
-        for row in &self.unsorted {
-            let arbiter = &arbiters[row.arbiter as usize];
-            for body in [arbiter.body1.index as usize, arbiter.body2.index as usize] {
-                self.used[body] = 0;
-                self.fixed_rows[body] = 0;
-            }
-        }
+    pub fn build(&mut self, order: &[Entry], arbiters: &mut [Arbiter], bodies: &SolverBodies, pool: &mut StagePool) {
+        self.clear_colors(bodies.states.len());
+        self.records.clear();
+        storage::reserve(&mut self.records, order.len());
+        self.records.resize(order.len(), Record::NONE);
+        let (arbiters, records) = (SharedSlice::new(arbiters), SharedSlice::new(&mut self.records));
+        pool.run_ranges(order.len(), LEAST_ARBITERS, |range| {
+            // SAFETY: an arbiter stands in the order once, and each place of the order belongs to one run.
+            unsafe { collect(order, range, &arbiters, bodies, &records) }
+        });
+        let counts = self.color();
+        self.sort(counts);
     }
 
-    /// Splits an arbiter into groups of equal normal and mode; each is a row.
-    fn add_rows(&mut self, index: u32, arbiter: &Arbiter, bodies: &mut SolverBodies) {
-        let data = &arbiter.data;
-        let locked = |body: u32| bodies.states[body as usize].locked != 0;
-        let extra = data.restitution > 0.0
-            || data.rolling_resistance > 0.0
-            || data.tangent_velocity != Vec3::ZERO
-            || locked(arbiter.body1.index)
-            || locked(arbiter.body2.index);
-        if data.flags & ONE_NORMAL != 0 {
-            let slots = data.usage_mask & 15;
-            let color = self.color(arbiter, bodies);
-            self.unsorted.push(RowSource { arbiter: index, slots, first: true, extra, color });
-            return;
-        }
-        let mut left = data.usage_mask & 15;
-        let mut first = true;
-        while left != 0 {
-            let lead = &data.slots[left.trailing_zeros() as usize];
-            let mut slots = 0;
-            for slot in 0..SLOTS {
-                let contact = &data.slots[slot];
-                let same = contact.remove == lead.remove && contact.normal == lead.normal;
-                slots |= u8::from(same && left >> slot & 1 == 1) << slot;
-            }
-            // A normal that is not equal to itself cannot occur (validated), but must not loop.
-            slots |= left & left.wrapping_neg();
-            left &= !slots;
-            let color = self.color(arbiter, bodies);
-            self.unsorted.push(RowSource { arbiter: index, slots, first, extra, color });
-            first = false;
-        }
+    /// Whether a row acts on a body that moves.
+    #[inline(always)]
+    pub fn constrains(&self, body: usize) -> bool {
+        self.used[body] != 0 || self.fixed_rows[body] != 0
     }
 
-    fn color(&mut self, arbiter: &Arbiter, bodies: &mut SolverBodies) -> u8 {
-        let (a, b) = (arbiter.body1.index as usize, arbiter.body2.index as usize);
-        let (a_moves, b_moves) = (bodies.states[a].moves != 0, bodies.states[b].moves != 0);
-        bodies.states[a].constrained = 1.0;
-        bodies.states[b].constrained = 1.0;
-        if a_moves && b_moves {
-            let free = !(self.used[a] | self.used[b]);
-            if free == 0 {
-                return OVERFLOW;
+    /// Forgets the colours of the last step.
+    fn clear_colors(&mut self, bodies: usize) {
+        if self.records.len() < bodies / 8 {
+            for body in self.records.iter().flat_map(|record| record.bodies) {
+                self.used[body as usize] = 0;
+                self.fixed_rows[body as usize] = 0;
             }
-            let bit = free & free.wrapping_neg();
-            self.used[a] |= bit;
-            self.used[b] |= bit;
-            1 + free.trailing_zeros() as u8
         } else {
-            let body = if a_moves { a } else { b };
-            let nth = self.fixed_rows[body];
-            if nth as usize >= STATIC_COLORS {
-                return OVERFLOW;
-            }
-            self.fixed_rows[body] += 1;
-            (1 + DYNAMIC_COLORS) as u8 + nth
+            self.used.fill(0);
+            self.fixed_rows.fill(0);
         }
+        self.used.resize(bodies, 0);
+        self.fixed_rows.resize(bodies, 0);
+    }
+
+    /// Gives each row its colour, and counts the rows by place: one further on, as [`Self::sort`] wants it.
+    fn color(&mut self) -> [u32; GROUPS * CLASSES + 1] {
+        let mut counts = [0; GROUPS * CLASSES + 1];
+        self.unsorted.clear();
+        storage::reserve(&mut self.unsorted, self.records.len());
+        for record in &self.records {
+            let [a, b] = record.bodies.map(|body| body as usize);
+            let mut rows = record.rows;
+            while rows != 0 {
+                let color = if record.moves[0] && record.moves[1] {
+                    dynamic_color(&mut self.used, a, b)
+                } else {
+                    static_color(&mut self.fixed_rows[if record.moves[0] { a } else { b }])
+                };
+                let source = RowSource {
+                    arbiter: record.arbiter,
+                    slots: rows as u8 & 15,
+                    first: rows == record.rows,
+                    extra: record.extra,
+                    color,
+                };
+                if color == OVERFLOW {
+                    self.crowded.extend(record.bodies);
+                }
+                counts[source.place() + 1] += 1;
+                storage::push(&mut self.unsorted, source);
+                rows >>= 4;
+            }
+        }
+        // Now that all colours are given, a bit more tells only that a row is there.
+        for body in self.crowded.drain(..) {
+            self.used[body as usize] |= 1;
+        }
+        counts
     }
 
     /// Counting sort by colour and class; equal ones keep their key order.
-    fn sort(&mut self) {
-        let mut counts = [0_u32; GROUPS * CLASSES + 1];
-        for row in &self.unsorted {
-            counts[row.color as usize * CLASSES + row.class() + 1] += 1;
-        }
+    fn sort(&mut self, mut counts: [u32; GROUPS * CLASSES + 1]) {
         for i in 1..counts.len() {
             counts[i] += counts[i - 1];
         }
@@ -190,9 +232,56 @@ impl RowPlan {
         storage::reserve(&mut self.rows, self.unsorted.len());
         self.rows.resize(self.unsorted.len(), RowSource::NONE);
         for row in &self.unsorted {
-            let next = &mut counts[row.color as usize * CLASSES + row.class()];
+            let next = &mut counts[row.place()];
             self.rows[*next as usize] = *row;
             *next += 1;
         }
     }
+}
+
+/// Writes the records of a part of the order.
+///
+/// # Safety
+/// No other thread may touch the arbiters of this part, or its records.
+unsafe fn collect(
+    order: &[Entry],
+    range: Range<usize>,
+    arbiters: &SharedSlice<'_, Arbiter>,
+    bodies: &SolverBodies,
+    records: &SharedSlice<'_, Record>,
+) {
+    for at in range {
+        if let Some(later) = order.get(at + PREFETCH_AHEAD) {
+            arbiters.prefetch_bytes(later.index as usize, std::mem::offset_of!(Arbiter, body1));
+            arbiters.prefetch_bytes(later.index as usize, std::mem::offset_of!(Arbiter, data.usage_mask));
+        }
+        let index = order[at].index;
+        // SAFETY: promised by the caller.
+        let (arbiter, record) = unsafe { (arbiters.get_mut(index as usize), records.get_mut(at)) };
+        arbiter.data.mark_solved();
+        *record = Record::of(index, arbiter, bodies);
+    }
+}
+
+/// The lowest colour that is free at both bodies.
+#[inline(always)]
+fn dynamic_color(used: &mut [u64], a: usize, b: usize) -> u8 {
+    let free = !(used[a] | used[b]);
+    if free == 0 {
+        return OVERFLOW;
+    }
+    let bit = free & free.wrapping_neg();
+    used[a] |= bit;
+    used[b] |= bit;
+    1 + free.trailing_zeros() as u8
+}
+
+/// The next colour of a body's rows with what is not dynamic.
+#[inline(always)]
+fn static_color(rows: &mut u8) -> u8 {
+    if *rows as usize >= STATIC_COLORS {
+        return OVERFLOW;
+    }
+    *rows += 1;
+    DYNAMIC_COLORS as u8 + *rows
 }

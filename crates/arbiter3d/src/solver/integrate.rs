@@ -15,13 +15,12 @@
 //! Bodies are independent: as many as there are lanes are integrated together, in blocks on all threads.
 
 use super::bodies::{BodyMass, BodyMotion, BodyState, SolverBodies};
+use super::coloring::RowPlan;
 use crate::math::Real;
 use crate::parallel::SharedSlice;
 use crate::simd::{Kernel, LaneRotation, LaneSymmetric, LaneVec3, Lanes, Number, Quad};
 use std::marker::PhantomData;
-
-/// Bodies that a thread takes at a time.
-pub(super) const BODIES_PER_BLOCK: usize = 128;
+use std::ops::Range;
 
 /// Spin below which its own torque is left out, radians a substep: the change of ω is that share of ω.
 const GYROSCOPIC_TURN: Real = 1e-5;
@@ -51,29 +50,32 @@ pub(crate) struct IntegrateTarget<'a> {
     states: SharedSlice<'a, BodyState>,
     motions: SharedSlice<'a, BodyMotion>,
     masses: SharedSlice<'a, BodyMass>,
+    plan: &'a RowPlan,
 }
 
 impl<'a> IntegrateTarget<'a> {
     /// Integrates the bodies of a list in which each stands once.
-    pub fn new(awake: &'a [u32], bodies: &'a mut SolverBodies) -> Self {
+    pub fn new(awake: &'a [u32], bodies: &'a mut SolverBodies, plan: &'a RowPlan) -> Self {
         assert!(awake.iter().all(|&body| (body as usize) < bodies.states.len()), "the list is of other bodies");
         Self {
             awake,
             states: SharedSlice::new(&mut bodies.states),
             motions: SharedSlice::new(&mut bodies.motions),
             masses: SharedSlice::new(&mut bodies.masses),
+            plan,
         }
     }
 
-    pub fn blocks(&self) -> usize {
-        self.awake.len().div_ceil(BODIES_PER_BLOCK)
+    /// How many groups of as many bodies as there are lanes.
+    pub fn groups_of(&self, lanes: usize) -> usize {
+        self.awake.len().div_ceil(lanes)
     }
 }
 
-/// Integrates one block of the list.
+/// Integrates some groups of the list.
 pub(super) struct IntegrateKernel<'a, W, const L: usize> {
     pub target: &'a IntegrateTarget<'a>,
-    pub block: usize,
+    pub groups: Range<usize>,
     pub phase: Integration,
     pub parameters: &'a IntegrateParameters,
     pub lanes: PhantomData<W>,
@@ -87,10 +89,10 @@ static NO_MASS: BodyMass = BodyMass::NONE;
 impl<W: Lanes<L>, const L: usize> Kernel for IntegrateKernel<'_, W, L> {
     #[inline(always)]
     fn run(self) {
-        let start = self.block * BODIES_PER_BLOCK;
-        let awake = &self.target.awake[start..(start + BODIES_PER_BLOCK).min(self.target.awake.len())];
+        let awake = self.target.awake;
+        let awake = &awake[self.groups.start * L..(self.groups.end * L).min(awake.len())];
         for bodies in awake.chunks(L) {
-            // SAFETY: a body stands in the list once, and this block alone has this part of the list.
+            // SAFETY: a body stands in the list once, and this run alone has this part of the list.
             unsafe {
                 match self.phase {
                     Integration::FirstVelocities => velocities::<W, L>(self.target, bodies, self.parameters, true),
@@ -169,6 +171,10 @@ unsafe fn velocities<W: Lanes<L>, const L: usize>(
                 (quads[0], quads[1]) = (state[0][lane], state[1][lane]);
                 let quads = target.motions.get_unchecked_mut(body as usize).quads_mut();
                 (quads[0], quads[1], quads[4]) = (free_linear[lane], free_angular[lane], residual[lane]);
+            }
+            if first && target.plan.constrains(body as usize) {
+                // SAFETY: as above.
+                unsafe { target.states.get_unchecked_mut(body as usize) }.constrained = 1.0;
             }
         }
     }

@@ -2,6 +2,7 @@
 
 use super::bodies::{BodyState, SharedStates};
 use super::coloring::{CLASSES, RowPlan, RowSource};
+use super::deal::Deal;
 use super::integrate::{IntegrateKernel, IntegrateParameters, IntegrateTarget, Integration};
 use super::prepare::{PrepareContext, RowTarget, SolvedRow, prepare_row, read_row, store_lane};
 use super::rows::{ExtraRow, FrictionRow, NormalRow, RowFeatures};
@@ -14,9 +15,13 @@ use crate::simd::{Avx2, Avx2Lanes, Avx512, Avx512Lanes, Sse2Lanes};
 use crate::simd::{Baseline, Instructions, Kernel, Lanes, SimdLevel, Wide, prefetch};
 use crate::storage;
 use std::marker::PhantomData;
+use std::ops::Range;
 
-/// Wide rows that a thread takes at a time.
-const ROWS_PER_BLOCK: usize = 16;
+/// Contacts that a thread takes at a time at least: what takes about a microsecond.
+const LEAST_CONTACTS: usize = 64;
+
+/// Bodies that a thread integrates at a time at least.
+const LEAST_BODIES: usize = 128;
 
 /// Which pass to run over the rows of a group.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -141,8 +146,8 @@ impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> RowSet<W, L, P
         enlarge(&mut self.features, count, RowFeatures::default());
     }
 
-    /// Shares the wide rows of `range` among threads.
-    fn share(&mut self, range: (usize, usize)) -> SharedRows<'_, W, L, P, C> {
+    /// Lets threads share the wide rows.
+    fn share(&mut self) -> SharedRows<'_, W, L, P, C> {
         SharedRows {
             normals: SharedSlice::new(&mut self.normals),
             frictions: SharedSlice::new(&mut self.frictions),
@@ -150,7 +155,6 @@ impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> RowSet<W, L, P
             extras_before: &self.extras_before,
             features: SharedSlice::new(&mut self.features),
             sources: &self.sources,
-            range,
         }
     }
 
@@ -160,7 +164,7 @@ impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> RowSet<W, L, P
     }
 }
 
-/// A run of wide rows as the threads share them, block by block.
+/// Wide rows as the threads share them, run by run.
 struct SharedRows<'a, W, const L: usize, const P: usize, const C: usize> {
     normals: SharedSlice<'a, NormalRow<W, L, P, C>>,
     frictions: SharedSlice<'a, FrictionRow<W, P>>,
@@ -168,24 +172,18 @@ struct SharedRows<'a, W, const L: usize, const P: usize, const C: usize> {
     extras_before: &'a [u32],
     features: SharedSlice<'a, RowFeatures>,
     sources: &'a [(u32, u32)],
-    range: (usize, usize),
 }
 
 impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> SharedRows<'_, W, L, P, C> {
-    fn blocks(&self) -> usize {
-        (self.range.1 - self.range.0).div_ceil(ROWS_PER_BLOCK)
-    }
-
-    /// The rows of a block.
+    /// The rows of a run.
     ///
     /// # Safety
-    /// Each block may be held once at a time.
-    unsafe fn block(&self, block: usize) -> Rows<'_, W, L, P, C> {
-        let start = self.range.0 + block * ROWS_PER_BLOCK;
-        let end = (start + ROWS_PER_BLOCK).min(self.range.1);
+    /// Runs held at the same time may not overlap.
+    unsafe fn run(&self, run: Range<usize>) -> Rows<'_, W, L, P, C> {
+        let (start, end) = (run.start, run.end);
         let extras_before = &self.extras_before[start..=end];
         let extras = (extras_before[0] as usize, extras_before[end - start] as usize);
-        // SAFETY: blocks do not overlap, and each is held once by the caller's promise.
+        // SAFETY: runs do not overlap, by the caller's promise.
         unsafe {
             Rows {
                 normals: self.normals.range_mut(start, end),
@@ -199,7 +197,7 @@ impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> SharedRows<'_,
     }
 }
 
-/// The wide rows of a block.
+/// A run of wide rows.
 struct Rows<'a, W, const L: usize, const P: usize, const C: usize> {
     normals: &'a mut [NormalRow<W, L, P, C>],
     frictions: &'a mut [FrictionRow<W, P>],
@@ -217,35 +215,35 @@ fn enlarge<T: Clone>(list: &mut Vec<T>, count: usize, empty: T) {
     }
 }
 
-/// The extra row of wide row `i` of a block, if it has one.
+/// The extra row of wide row `i` of a run, if it has one.
 #[inline(always)]
 fn extra_of<'a, E>(extras: &'a mut [E], before: &[u32], i: usize) -> Option<&'a mut E> {
     if before[i] == before[i + 1] { None } else { extras.get_mut((before[i] - before[0]) as usize) }
 }
 
 struct PrepareKernel<'a, W, const L: usize, const P: usize, const C: usize> {
-    block: Rows<'a, W, L, P, C>,
-    rows: &'a [RowSource],
+    rows: Rows<'a, W, L, P, C>,
+    plan: &'a [RowSource],
     context: &'a PrepareContext<'a>,
 }
 
 impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> Kernel for PrepareKernel<'_, W, L, P, C> {
     #[inline(always)]
     fn run(self) {
-        let block = self.block;
-        for (i, &(first, count)) in block.sources.iter().enumerate() {
-            if let Some(&(first, count)) = block.sources.get(i + 1) {
-                for source in &self.rows[first as usize..(first + count) as usize] {
+        let rows = self.rows;
+        for (i, &(first, count)) in rows.sources.iter().enumerate() {
+            if let Some(&(first, count)) = rows.sources.get(i + 1) {
+                for source in &self.plan[first as usize..(first + count) as usize] {
                     prefetch(&self.context.arbiters[source.arbiter as usize]);
                 }
             }
             let target = RowTarget {
-                row: &mut block.normals[i],
-                friction: &mut block.frictions[i],
-                extra: extra_of(block.extras, block.extras_before, i),
-                features: &mut block.features[i],
+                row: &mut rows.normals[i],
+                friction: &mut rows.frictions[i],
+                extra: extra_of(rows.extras, rows.extras_before, i),
+                features: &mut rows.features[i],
             };
-            let sources = &self.rows[first as usize..(first + count) as usize];
+            let sources = &self.plan[first as usize..(first + count) as usize];
             prepare_row(target, sources, self.context);
         }
     }
@@ -261,25 +259,25 @@ struct StoreShared<'a> {
 }
 
 struct StoreKernel<'a, W, const L: usize, const P: usize, const C: usize> {
-    block: Rows<'a, W, L, P, C>,
+    rows: Rows<'a, W, L, P, C>,
     target: &'a StoreShared<'a>,
 }
 
 impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> Kernel for StoreKernel<'_, W, L, P, C> {
     #[inline(always)]
     fn run(self) {
-        let (target, block) = (self.target, self.block);
-        for (i, &(first, count)) in block.sources.iter().enumerate() {
-            if let Some(&(first, count)) = block.sources.get(i + 1) {
+        let (target, rows) = (self.target, self.rows);
+        for (i, &(first, count)) in rows.sources.iter().enumerate() {
+            if let Some(&(first, count)) = rows.sources.get(i + 1) {
                 for source in &target.rows[first as usize..(first + count) as usize] {
                     target.arbiters.prefetch(source.arbiter as usize);
                 }
             }
             let solved = SolvedRow {
-                row: &block.normals[i],
-                friction: &block.frictions[i],
-                extra: extra_of(block.extras, block.extras_before, i).map(|extra| &*extra),
-                features: block.features[i],
+                row: &rows.normals[i],
+                friction: &rows.frictions[i],
+                extra: extra_of(rows.extras, rows.extras_before, i).map(|extra| &*extra),
+                features: rows.features[i],
             };
             // SAFETY: storing writes no states.
             let outcome = unsafe { read_row(&solved, &target.states, target.break_distance) };
@@ -290,7 +288,7 @@ impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> Kernel for Sto
                 // one after the other; those of the serial group are stored by one thread.
                 let arbiter = unsafe { target.arbiters.get_mut(source.arbiter as usize) };
                 store_lane(&outcome, &solved, lane, source, arbiter);
-                // SAFETY: each row belongs to one block alone.
+                // SAFETY: each row belongs to one run alone.
                 *unsafe { target.may_break.get_mut(row) } = outcome.excess[lane] > 0.0;
             }
         }
@@ -298,7 +296,7 @@ impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> Kernel for Sto
 }
 
 struct PassKernel<'a, W, const L: usize, const P: usize, const C: usize> {
-    block: Rows<'a, W, L, P, C>,
+    rows: Rows<'a, W, L, P, C>,
     pass: Pass,
     states: &'a SharedStates<'a>,
     parameters: &'a PassParameters,
@@ -307,16 +305,16 @@ struct PassKernel<'a, W, const L: usize, const P: usize, const C: usize> {
 impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> Kernel for PassKernel<'_, W, L, P, C> {
     #[inline(always)]
     fn run(self) {
-        let (block, parameters) = (self.block, self.parameters);
-        for i in 0..block.sources.len() {
+        let (rows, parameters) = (self.rows, self.parameters);
+        for i in 0..rows.sources.len() {
             let row = RowPass {
-                row: &mut block.normals[i],
-                friction: &mut block.frictions[i],
-                extra: extra_of(block.extras, block.extras_before, i),
-                features: block.features[i],
+                row: &mut rows.normals[i],
+                friction: &mut rows.frictions[i],
+                extra: extra_of(rows.extras, rows.extras_before, i),
+                features: rows.features[i],
                 states: self.states,
             };
-            // SAFETY: rows of one colour share no dynamic body, and each block runs on one thread.
+            // SAFETY: rows of one colour share no dynamic body, and each run is one thread's.
             unsafe {
                 match self.pass {
                     Pass::WarmStart => row.warm_start(),
@@ -337,53 +335,74 @@ struct LaneSolver<I, W, const L: usize> {
     four: RowSet<W, L, 4, 6>,
     /// Groups whose rows share bodies.
     serial: Vec<bool>,
+    /// The rows of each group as threads share them; there may be more of them than groups.
+    deals: Vec<Deal>,
+    all: Deal,
     /// Whether some row may bounce.
     bounces: bool,
 }
 
 impl<I: Instructions, W: Lanes<L>, const L: usize> LaneSolver<I, W, L> {
     const fn new(level: I) -> Self {
-        Self { level, serial: Vec::new(), bounces: false, one: RowSet::new(), two: RowSet::new(), four: RowSet::new() }
-    }
-}
-
-/// The three classes of a group.
-struct Group<'a, W, const L: usize> {
-    one: SharedRows<'a, W, L, 1, 0>,
-    two: SharedRows<'a, W, L, 2, 1>,
-    four: SharedRows<'a, W, L, 4, 6>,
-}
-
-impl<W: Lanes<L>, const L: usize> Group<'_, W, L> {
-    /// Calls `visit` with each block of each class: on all threads, or in order on this one where rows share bodies.
-    fn for_each_block(&self, serial: bool, pool: &mut StagePool, visit: impl Fn(usize, usize) + Sync) {
-        let (ones, twos, fours) = (self.one.blocks(), self.two.blocks(), self.four.blocks());
-        let stage = |block: usize| {
-            if block < fours {
-                visit(2, block);
-            } else if block < fours + twos {
-                visit(1, block - fours);
-            } else {
-                visit(0, block - fours - twos);
-            }
-        };
-        let count = ones + twos + fours;
-        if serial { (0..count).for_each(stage) } else { pool.run(count, stage) }
+        Self {
+            level,
+            serial: Vec::new(),
+            deals: Vec::new(),
+            all: Deal::EMPTY,
+            bounces: false,
+            one: RowSet::new(),
+            two: RowSet::new(),
+            four: RowSet::new(),
+        }
     }
 }
 
 impl<I: Instructions, W: Lanes<L>, const L: usize> LaneSolver<I, W, L> {
-    /// The wide rows of a group.
-    fn group(&mut self, group: usize) -> Group<'_, W, L> {
-        let range = |groups: &[(u32, u32)]| (groups[group].0 as usize, groups[group].1 as usize);
-        let ranges = (range(&self.one.groups), range(&self.two.groups), range(&self.four.groups));
-        Group { one: self.one.share(ranges.0), two: self.two.share(ranges.1), four: self.four.share(ranges.2) }
+    /// Lists the rows of each group, and of all, for as many threads.
+    fn deal_rows(&mut self, threads: usize) {
+        let sets = [&self.one.groups, &self.two.groups, &self.four.groups];
+        let rows = |class: usize, group: usize| {
+            let (start, end) = sets[class][group];
+            start as usize..end as usize
+        };
+        self.all.clear();
+        self.deals.resize(self.serial.len().max(self.deals.len()), Deal::EMPTY);
+        for (group, deal) in self.deals.iter_mut().take(self.serial.len()).enumerate() {
+            deal.clear();
+            for thread in 0..threads {
+                for class in (0..CLASSES).rev() {
+                    deal.add(class, rows(class, group), (thread, threads));
+                }
+            }
+        }
+        if threads == 1 {
+            let counts = [self.one.sources.len(), self.two.sources.len(), self.four.sources.len()];
+            for class in (0..CLASSES).rev() {
+                self.all.add(class, 0..counts[class], (0, 1));
+            }
+            return;
+        }
+        for thread in 0..threads {
+            for group in 0..self.serial.len() {
+                for class in (0..CLASSES).rev() {
+                    self.all.add(class, rows(class, group), (thread, threads));
+                }
+            }
+        }
     }
+}
 
-    /// All wide rows.
-    fn all(&mut self) -> Group<'_, W, L> {
-        let ends = (self.one.sources.len(), self.two.sources.len(), self.four.sources.len());
-        Group { one: self.one.share((0, ends.0)), two: self.two.share((0, ends.1)), four: self.four.share((0, ends.2)) }
+/// Calls `visit` with runs of a deal's rows: on all threads, or in order on this one where rows share bodies.
+fn for_each_run<const L: usize>(
+    deal: &Deal,
+    serial: bool,
+    pool: &mut StagePool,
+    visit: impl Fn(usize, Range<usize>) + Sync,
+) {
+    if serial {
+        deal.visit(0..deal.count(), visit);
+    } else {
+        pool.run_ranges(deal.count(), LEAST_CONTACTS.div_ceil(L), |items| deal.visit(items, &visit));
     }
 }
 
@@ -395,15 +414,16 @@ impl<I: Instructions, W: Lanes<L>, const L: usize> ContactSolver for LaneSolver<
         self.one.lay_out(plan, 0);
         self.two.lay_out(plan, 1);
         self.four.lay_out(plan, 2);
-        let (level, rows) = (self.level, &plan.rows[..]);
-        let all = self.all();
-        all.for_each_block(false, pool, |class, block| {
-            // SAFETY: each block is visited once.
+        self.deal_rows(pool.active_threads());
+        let (level, plan) = (self.level, &plan.rows[..]);
+        let (one, two, four) = (self.one.share(), self.two.share(), self.four.share());
+        for_each_run::<L>(&self.all, false, pool, |class, run| {
+            // SAFETY: each run is visited once.
             unsafe {
                 match class {
-                    0 => level.run(PrepareKernel { block: all.one.block(block), rows, context }),
-                    1 => level.run(PrepareKernel { block: all.two.block(block), rows, context }),
-                    _ => level.run(PrepareKernel { block: all.four.block(block), rows, context }),
+                    0 => level.run(PrepareKernel { rows: one.run(run), plan, context }),
+                    1 => level.run(PrepareKernel { rows: two.run(run), plan, context }),
+                    _ => level.run(PrepareKernel { rows: four.run(run), plan, context }),
                 }
             }
         });
@@ -422,15 +442,15 @@ impl<I: Instructions, W: Lanes<L>, const L: usize> ContactSolver for LaneSolver<
             return;
         }
         let states = &SharedSlice::new(states);
-        let (level, serial) = (self.level, self.serial[group]);
-        let group = self.group(group);
-        group.for_each_block(serial, pool, |class, block| {
-            // SAFETY: each block is visited once.
+        let level = self.level;
+        let (one, two, four) = (self.one.share(), self.two.share(), self.four.share());
+        for_each_run::<L>(&self.deals[group], self.serial[group], pool, |class, run| {
+            // SAFETY: each run is visited once.
             unsafe {
                 match class {
-                    0 => level.run(PassKernel { block: group.one.block(block), pass, states, parameters }),
-                    1 => level.run(PassKernel { block: group.two.block(block), pass, states, parameters }),
-                    _ => level.run(PassKernel { block: group.four.block(block), pass, states, parameters }),
+                    0 => level.run(PassKernel { rows: one.run(run), pass, states, parameters }),
+                    1 => level.run(PassKernel { rows: two.run(run), pass, states, parameters }),
+                    _ => level.run(PassKernel { rows: four.run(run), pass, states, parameters }),
                 }
             }
         });
@@ -444,8 +464,8 @@ impl<I: Instructions, W: Lanes<L>, const L: usize> ContactSolver for LaneSolver<
         pool: &mut StagePool,
     ) {
         let target = &target;
-        pool.run(target.blocks(), |block| {
-            self.level.run(IntegrateKernel::<W, L> { target, block, phase, parameters, lanes: PhantomData });
+        pool.run_ranges(target.groups_of(L), LEAST_BODIES.div_ceil(L), |groups| {
+            self.level.run(IntegrateKernel::<W, L> { target, groups, phase, parameters, lanes: PhantomData });
         });
     }
 
@@ -457,16 +477,16 @@ impl<I: Instructions, W: Lanes<L>, const L: usize> ContactSolver for LaneSolver<
             break_distance: target.break_distance,
             may_break: SharedSlice::new(target.may_break),
         };
+        let level = self.level;
+        let (one, two, four) = (self.one.share(), self.two.share(), self.four.share());
         for index in 0..target.plan.groups.len() {
-            let (level, serial) = (self.level, self.serial[index]);
-            let group = self.group(index);
-            group.for_each_block(serial, pool, |class, block| {
-                // SAFETY: each block is visited once.
+            for_each_run::<L>(&self.deals[index], self.serial[index], pool, |class, run| {
+                // SAFETY: each run is visited once.
                 unsafe {
                     match class {
-                        0 => level.run(StoreKernel { block: group.one.block(block), target: shared }),
-                        1 => level.run(StoreKernel { block: group.two.block(block), target: shared }),
-                        _ => level.run(StoreKernel { block: group.four.block(block), target: shared }),
+                        0 => level.run(StoreKernel { rows: one.run(run), target: shared }),
+                        1 => level.run(StoreKernel { rows: two.run(run), target: shared }),
+                        _ => level.run(StoreKernel { rows: four.run(run), target: shared }),
                     }
                 }
             });

@@ -2,6 +2,7 @@
 
 mod bodies;
 mod coloring;
+mod deal;
 mod integrate;
 mod lanes;
 mod prepare;

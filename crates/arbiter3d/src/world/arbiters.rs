@@ -1,10 +1,13 @@
 //! Arbiters as the world's users see them: look up, make, feed, remove.
 
 use super::World;
+use super::bodies::Body;
 use super::definition::Material;
 use super::events::EndEvent;
+use super::pairs::Pair;
+use super::shapes::ShapeSlot;
 use crate::arbiter::{
-    Arbiter, ArbiterId, ArbiterKey, Contact, ContactPoint, EndReason, FRICTION_OVERRIDDEN, NONE,
+    Arbiter, ArbiterId, ArbiterKey, Contact, ContactData, ContactPoint, EndReason, FRICTION_OVERRIDDEN, NONE,
     RESTITUTION_OVERRIDDEN, ROLLING_OVERRIDDEN, SolveMode, TANGENT_VELOCITY_OVERRIDDEN,
 };
 use crate::error::{Error, finite_vec, unit_vec};
@@ -211,42 +214,6 @@ impl World {
         }
     }
 
-    /// Material of an engine arbiter, from its two shapes; what users have set stays.
-    pub(crate) fn mix_shape_materials(&mut self, index: u32) {
-        let arbiter = self.arbiters.at(index);
-        let pair = &self.pairs[arbiter.pair as usize];
-        let [a, b] = pair.shapes.map(|slot| &self.shapes[slot as usize]);
-        let (ma, mb) = (&a.material, &b.material);
-        let friction = ma.friction_combine.max(mb.friction_combine).combine(ma.friction, mb.friction);
-        let restitution = ma.restitution_combine.max(mb.restitution_combine).combine(ma.restitution, mb.restitution);
-        let rolling = max(ma.rolling_resistance, mb.rolling_resistance)
-            * rolling_radius([&a.geometry, &b.geometry], [ma, mb].map(|m| m.rolling_resistance));
-        let tangent = surface_velocity([ma, mb], pair.bodies.map(|body| self.bodies[body as usize].pose.rotation));
-        let conveyor = [ma, mb].iter().any(|material| material.tangent_velocity != Vec3::ZERO);
-        let pair = self.arbiters.at(index).pair;
-        self.pairs[pair as usize].conveyor = conveyor;
-        let data = &mut self.arbiters.at_mut(index).data;
-        let keeps = |flag: u8| data.flags & flag != 0;
-        let (f, r, t, o) = (
-            keeps(FRICTION_OVERRIDDEN),
-            keeps(RESTITUTION_OVERRIDDEN),
-            keeps(TANGENT_VELOCITY_OVERRIDDEN),
-            keeps(ROLLING_OVERRIDDEN),
-        );
-        if !f {
-            data.friction = friction;
-        }
-        if !r {
-            data.restitution = restitution;
-        }
-        if !t {
-            data.tangent_velocity = tangent;
-        }
-        if !o {
-            data.rolling_resistance = rolling;
-        }
-    }
-
     /// Material of a custom arbiter: the maximum over the shapes of both bodies, or the defaults where neither has any.
     fn mix_body_materials(&mut self, index: u32) {
         let arbiter = self.arbiters.at(index);
@@ -281,9 +248,41 @@ impl World {
             if self.arbiters.at(index).pair == NONE {
                 self.mix_body_materials(index);
             } else {
-                self.mix_shape_materials(index);
+                let arbiter = self.arbiters.at_mut(index);
+                let pair = &mut self.pairs[arbiter.pair as usize];
+                mix_shape_materials(pair, &mut arbiter.data, &self.shapes, &self.bodies);
             }
         }
+    }
+}
+
+/// Material of an engine arbiter, from its two shapes; what users have set stays.
+pub(crate) fn mix_shape_materials(pair: &mut Pair, data: &mut ContactData, shapes: &[ShapeSlot], bodies: &[Body]) {
+    let [a, b] = pair.shapes.map(|slot| &shapes[slot as usize]);
+    let (ma, mb) = (&a.material, &b.material);
+    let friction = ma.friction_combine.max(mb.friction_combine).combine(ma.friction, mb.friction);
+    let restitution = ma.restitution_combine.max(mb.restitution_combine).combine(ma.restitution, mb.restitution);
+    let rolling = max(ma.rolling_resistance, mb.rolling_resistance)
+        * rolling_radius([&a.geometry, &b.geometry], [ma, mb].map(|m| m.rolling_resistance));
+    pair.conveyor = [ma, mb].iter().any(|material| material.tangent_velocity != Vec3::ZERO);
+    let free = |flag: u8| data.flags & flag == 0;
+    let (f, r, t, o) = (
+        free(FRICTION_OVERRIDDEN),
+        free(RESTITUTION_OVERRIDDEN),
+        free(TANGENT_VELOCITY_OVERRIDDEN),
+        free(ROLLING_OVERRIDDEN),
+    );
+    if f {
+        data.friction = friction;
+    }
+    if r {
+        data.restitution = restitution;
+    }
+    if t {
+        data.tangent_velocity = surface_velocity([ma, mb], pair.bodies.map(|body| bodies[body as usize].pose.rotation));
+    }
+    if o {
+        data.rolling_resistance = rolling;
     }
 }
 

@@ -11,7 +11,7 @@ use super::shapes::ShapeSlot;
 use crate::arbiter::{EndReason, NONE};
 use crate::math::{Pose, Real, Rotation, Vec3, max, min};
 use crate::narrow_phase::PairCache;
-use crate::simd::Quad;
+use crate::simd::{Quad, prefetch};
 use crate::storage;
 
 /// What the world keeps of a pair. Shape 1 has the smaller id.
@@ -48,6 +48,9 @@ pub(crate) struct Pair {
     next: [u32; 2],
     previous: [u32; 2],
 }
+
+/// How many pairs ahead of its end what a pair touches is asked for.
+const PARTED_AHEAD: usize = 4;
 
 /// How far a pair may move, in shares of the smaller shape's inner radius, before its manifold is made anew.
 const REUSE_TRANSLATION: Real = 0.02;
@@ -242,9 +245,24 @@ impl World {
         self.drop_pair(index, reason);
     }
 
-    /// Ends a pair whose fat boxes did not overlap any more in this step's search: the broad phase knows.
-    pub(crate) fn part_pair(&mut self, index: u32) {
-        self.drop_pair(index, EndReason::Separated);
+    /// Ends pairs whose fat boxes did not overlap any more in this step's search: the broad phase knows.
+    pub(crate) fn part_pairs(&mut self, list: &[u32]) {
+        for (at, &index) in list.iter().enumerate() {
+            if let Some(&later) = list.get(at + 2 * PARTED_AHEAD) {
+                prefetch(&self.pairs[later as usize].shapes);
+                prefetch(&self.pairs[later as usize].next);
+            }
+            if let Some(&later) = list.get(at + PARTED_AHEAD) {
+                let pair = &self.pairs[later as usize];
+                self.pair_set.prefetch(pair.shapes[0], pair.shapes[1]);
+                for edge in pair.next.into_iter().chain(pair.previous) {
+                    if let Some(neighbour) = self.pairs.get((edge >> 1) as usize) {
+                        prefetch(&neighbour.next);
+                    }
+                }
+            }
+            self.drop_pair(index, EndReason::Separated);
+        }
     }
 
     fn drop_pair(&mut self, index: u32, reason: EndReason) {

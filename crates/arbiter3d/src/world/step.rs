@@ -11,6 +11,7 @@ use crate::error::{Error, in_range};
 use crate::id::BodyId;
 use crate::math::{Aabb, Real, Vec3, min};
 use crate::parallel::{BlockList, Gather, SharedSlice};
+use crate::simd::prefetch;
 use crate::solver::{
     BodyMass, BodyMotion, BodyState, IntegrateParameters, IntegrateTarget, Integration, Pass, PassParameters,
     PrepareContext, Softness, StoreTarget,
@@ -21,7 +22,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// soft springs: to 3 cm, measured on 1,000 mixed bodies.
 const DEEPEST_REST: Real = 1.97;
 /// Bodies that a thread takes at a time.
-const BODIES_PER_BLOCK: usize = 128;
+const BODIES_PER_BLOCK: usize = 64;
 
 /// Rows whose contacts a thread looks at at a time.
 const ROWS_PER_BLOCK: usize = 512;
@@ -29,6 +30,11 @@ const ROWS_PER_BLOCK: usize = 512;
 const EMPTY_PER_BLOCK: usize = 16;
 /// Parts of the search for pairs for each thread: they differ in size.
 const PARTS_PER_THREAD: usize = 16;
+
+/// How many pairs ahead of its making what a pair touches is asked for.
+const FOUND_AHEAD: usize = 6;
+/// The same for arbiters that end.
+const BROKEN_AHEAD: usize = 4;
 
 /// Awake bodies, pairs and arbiters from which on a step uses several threads: below, waiting for each other costs more.
 const WORK_FOR_THREADS: usize = 1500;
@@ -215,13 +221,27 @@ impl World {
         }
         let mut found = std::mem::take(&mut self.scratch.pairs);
         self.search_pairs(&mut found);
-        for &(a, b) in &found {
+        for (at, &(a, b)) in found.iter().enumerate() {
+            if let Some(&(a, b)) = found.get(at + FOUND_AHEAD) {
+                self.prefetch_pair(a, b);
+            }
             if self.passes_pair_filter(a, b) {
                 self.add_pair(a, b);
             }
         }
         found.clear();
         self.scratch.pairs = found;
+    }
+
+    /// Asks for what a new pair of two shapes will touch.
+    fn prefetch_pair(&self, a: u32, b: u32) {
+        self.pair_set.prefetch(a, b);
+        for slot in [a, b] {
+            let body = &self.bodies[self.shapes[slot as usize].body as usize];
+            prefetch(&body.awake);
+            prefetch(&body.first_pair);
+            prefetch(&body.reach);
+        }
     }
 
     /// The pairs that are new, sorted.
@@ -244,7 +264,7 @@ impl World {
             broad_phase.pairs_of(&work[block], is_new, |a, b| list.push((a, b)));
         });
         found.append(self.scratch.found.list());
-        self.broad_phase.finish(found);
+        self.broad_phase.finish(found, Some(&mut self.pool));
     }
 
     fn call_providers(&mut self) {
@@ -261,7 +281,7 @@ impl World {
     fn plan_rows(&mut self) {
         self.arbiters.awake_by_key();
         let (order, arbiters) = self.arbiters.order_and_slots_mut();
-        self.plan.build(order, arbiters, &mut self.solver_bodies);
+        self.plan.build(order, arbiters, &self.solver_bodies, &mut self.pool);
     }
 
     fn prepare_rows(&mut self) {
@@ -314,7 +334,7 @@ impl World {
     }
 
     fn integrate(&mut self, phase: Integration, parameters: &IntegrateParameters) {
-        let target = IntegrateTarget::new(&self.scratch.sorted_awake, &mut self.solver_bodies);
+        let target = IntegrateTarget::new(&self.scratch.sorted_awake, &mut self.solver_bodies, &self.plan);
         self.solver.integrate(phase, target, parameters, &mut self.pool);
     }
 
@@ -342,7 +362,7 @@ impl World {
         left.prepare(self.pool.threads(), BODIES_PER_BLOCK);
         self.finalize_bodies(dt, &gather, &left);
         // Before the fast: a body that is stopped short moves its boxes back. In any order: the tree comes out the same.
-        self.broad_phase.lift(left.list());
+        self.broad_phase.lift(left.list(), Some(&mut self.pool));
         self.scratch.moved.append(left.list());
         self.scratch.left = left;
         let news = gather.list();
@@ -419,9 +439,16 @@ impl World {
         empty.sort_unstable();
         empty.dedup();
         self.keep_overlapping(&mut empty);
-        for index in empty.drain(..) {
+        for (at, &index) in empty.iter().enumerate() {
+            if let Some(&later) = empty.get(at + 2 * BROKEN_AHEAD) {
+                self.arbiters.prefetch_links(later);
+            }
+            if let Some(&later) = empty.get(at + BROKEN_AHEAD) {
+                self.arbiters.prefetch_end(later);
+            }
             self.end_arbiter(index, EndReason::Separated);
         }
+        empty.clear();
         self.narrow.empty = empty;
     }
 

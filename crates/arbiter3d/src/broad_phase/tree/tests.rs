@@ -72,7 +72,7 @@ impl Model {
         match random.below(6) {
             0 => self.tree.rebuild_loose(),
             1 => self.tree.refit_marked(),
-            2 => self.tree.clear_marks(|_, _| ()),
+            2 => self.tree.clear_marks(|_, _| (), None),
             3 => self.tree.rebuild(),
             _ => {}
         }
@@ -138,7 +138,7 @@ fn pair_search_agrees_with_brute_force() {
     for round in 0..200 {
         for model in &mut models {
             if round % 4 == 0 {
-                model.tree.clear_marks(|_, _| ());
+                model.tree.clear_marks(|_, _| (), None);
             }
             for _ in 0..20 {
                 model.edit(&mut random);
@@ -343,7 +343,7 @@ fn a_refit_is_tight() {
             tree.move_leaf(leaf, &random.aabb());
         }
         tree.refit_marked();
-        tree.clear_marks(|_, _| ());
+        tree.clear_marks(|_, _| (), None);
         for index in tree.inner_nodes() {
             let node = &tree.nodes[index as usize];
             for side in 0..2 {

@@ -380,7 +380,8 @@ impl<W: Lanes<L>, const L: usize> BlockKernel<'_, W, L> {
             }
         } else if context.begins(pair, places) {
             let [id1, id2] = pair.shapes.map(|slot| context.shapes[slot as usize].id);
-            self.begins.push(Begin { key: ArbiterKey::of_shapes(id1, id2), pair: item.pair, places: *places });
+            let (key, bodies) = (ArbiterKey::of_shapes(id1, id2), pair.bodies);
+            self.begins.push(Begin { key, pair: item.pair, bodies, arbiter: NONE, places: *places });
         }
     }
 }

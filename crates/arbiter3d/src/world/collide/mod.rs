@@ -14,22 +14,28 @@ mod block;
 mod contacts;
 
 use super::World;
+use super::arbiters::mix_shape_materials;
 use super::bodies::Body;
 use super::filters::UserFilters;
 use super::pairs::Pair;
 use super::settings::WorldSettings;
 use super::shapes::ShapeSlot;
-use crate::arbiter::ArbiterKey;
+use crate::arbiter::{ArbiterKey, NONE};
 use crate::math::Real;
 use crate::narrow_phase::{Manifold, collide};
 use crate::parallel::{Gather, SharedSlice};
 #[cfg(target_arch = "x86_64")]
 use crate::simd::{Avx2, Avx2Lanes, Avx512, Avx512Lanes, Sse2Lanes};
-use crate::simd::{Baseline, Instructions, Lanes, SimdLevel, Wide};
+use crate::simd::{Baseline, Instructions, Lanes, SimdLevel, Wide, prefetch};
 use crate::solver::SolverBodies;
 use block::{BlockKernel, PAIRS_PER_BLOCK, WORDS_PER_BLOCK};
 use contacts::{Places, update_contacts};
 use std::marker::PhantomData;
+
+/// How many begins ahead of its making what an arbiter touches is asked for.
+const BEGINS_AHEAD: usize = 8;
+/// Arbiters that a thread fills at a time at least.
+const LEAST_BEGINS: usize = 32;
 
 /// What a pair has to tell beyond its own records.
 #[derive(Clone, Copy, Debug)]
@@ -47,6 +53,9 @@ enum News {
 struct Begin {
     key: ArbiterKey,
     pair: u32,
+    bodies: [u32; 2],
+    /// Once it is made.
+    arbiter: u32,
     places: Places,
 }
 
@@ -71,6 +80,8 @@ pub(crate) struct NarrowPhaseScratch {
     /// Runs of pairs of which one is active.
     blocks: Vec<u32>,
     begins: Gather<Begin>,
+    /// Places of the begins, by key.
+    begin_order: Vec<(ArbiterKey, u32)>,
     apart: Vec<u32>,
     sensors: Vec<(u32, bool)>,
     /// Arbiters that may have nothing left.
@@ -115,14 +126,10 @@ impl World {
             self.set_sensor_overlap(pair, overlaps);
         }
         scratch.apart.sort_unstable();
-        for pair in scratch.apart.drain(..) {
-            self.part_pair(pair);
-        }
+        self.part_pairs(&scratch.apart);
+        scratch.apart.clear();
         scratch.empty.retain(|&index| self.arbiters.at(index).alive);
-        scratch.begins.list().sort_unstable_by_key(|begin| begin.key);
-        for begin in scratch.begins.list().drain(..) {
-            self.begin_pair(&begin);
-        }
+        self.begin_pairs(scratch.begins.list(), &mut scratch.begin_order);
         self.narrow = scratch;
     }
 
@@ -166,26 +173,57 @@ impl World {
         ArbiterKey::of_shapes(a, b)
     }
 
-    /// Makes the arbiter of a pair that begins to touch.
-    fn begin_pair(&mut self, begin: &Begin) {
-        let (key, pair_index) = (begin.key, begin.pair);
-        let pair = &self.pairs[pair_index as usize];
-        let [b1, b2] = pair.bodies;
-        let reusable = self.filters.contact.is_none();
-        let ids = [self.body_id(b1), self.body_id(b2)];
-        let index = match self.arbiters.find(key) {
-            None => self.create_arbiter(key, ids[0], ids[1]),
+    /// Makes the arbiters of the pairs that begin to touch, by key, then fills them on all threads.
+    fn begin_pairs(&mut self, begins: &mut Vec<Begin>, order: &mut Vec<(ArbiterKey, u32)>) {
+        order.extend(begins.iter().zip(0..).map(|(begin, place)| (begin.key, place)));
+        order.sort_unstable();
+        for (at, &(_, place)) in order.iter().enumerate() {
+            if let Some(&(key, later)) = order.get(at + BEGINS_AHEAD) {
+                let later = &begins[later as usize];
+                prefetch(&self.pairs[later.pair as usize].arbiter);
+                for body in later.bodies {
+                    prefetch(&self.bodies[body as usize].island);
+                }
+                self.arbiters.prefetch_new(key, later.bodies, BEGINS_AHEAD);
+            }
+            self.begin_pair(&mut begins[place as usize]);
+        }
+        order.clear();
+        self.fill_arbiters(begins);
+        begins.clear();
+    }
+
+    /// Makes the arbiter of a pair that begins to touch, without contacts.
+    fn begin_pair(&mut self, begin: &mut Begin) {
+        let ids = begin.bodies.map(|body| self.body_id(body));
+        begin.arbiter = match self.arbiters.find(begin.key) {
+            None => self.create_arbiter(begin.key, ids[0], ids[1]),
             // The user has made an arbiter under the key of these shapes: it is theirs from now on.
             Some(index) if [self.arbiters.at(index).body1, self.arbiters.at(index).body2] == ids => index,
             Some(_) => return, // a key that was not reserved, in use between other bodies
         };
-        let arbiter = self.arbiters.at_mut(index);
-        arbiter.pair = pair_index;
-        let rotations = [b1, b2].map(|body| self.solver_bodies.masses[body as usize].rotation);
-        update_contacts(&mut arbiter.data, &begin.places, rotations, self.scaled.contact_break_distance);
-        let pair = &mut self.pairs[pair_index as usize];
-        (pair.arbiter, pair.has_manifold) = (index, reusable);
-        self.mix_shape_materials(index);
+        self.arbiters.at_mut(begin.arbiter).pair = begin.pair;
+        self.pairs[begin.pair as usize].arbiter = begin.arbiter;
+    }
+
+    /// Gives contacts and materials to the arbiters just made.
+    fn fill_arbiters(&mut self, begins: &[Begin]) {
+        let reusable = self.filters.contact.is_none();
+        let (shapes, bodies, masses) = (&self.shapes, &self.bodies, &self.solver_bodies.masses);
+        let break_distance = self.scaled.contact_break_distance;
+        let pairs = SharedSlice::new(&mut self.pairs);
+        let arbiters = SharedSlice::new(self.arbiters.slots_mut());
+        self.pool.run_ranges(begins.len(), LEAST_BEGINS, |range| {
+            for begin in begins[range].iter().filter(|begin| begin.arbiter != NONE) {
+                // SAFETY: a pair begins once, and an arbiter belongs to one pair.
+                let (pair, arbiter) =
+                    unsafe { (pairs.get_mut(begin.pair as usize), arbiters.get_mut(begin.arbiter as usize)) };
+                let rotations = begin.bodies.map(|body| masses[body as usize].rotation);
+                update_contacts(&mut arbiter.data, &begin.places, rotations, break_distance);
+                pair.has_manifold = reusable;
+                mix_shape_materials(pair, &mut arbiter.data, shapes, bodies);
+            }
+        });
     }
 }
 
