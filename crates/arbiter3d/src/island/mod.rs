@@ -14,14 +14,18 @@ use crate::storage;
 pub(crate) struct IslandFinder {
     /// Parent of each body, by slot; meaningful for the bodies last reset.
     parents: Vec<u32>,
+    /// By root: whether a body of the island is too busy to sleep.
+    busy: Vec<bool>,
 }
 
 impl IslandFinder {
     /// Starts with each of `bodies` alone.
     pub fn reset(&mut self, slots: usize, bodies: impl Iterator<Item = u32>) {
         self.parents.resize(slots, 0);
+        self.busy.resize(slots, false);
         for body in bodies {
             self.parents[body as usize] = body;
+            self.busy[body as usize] = false;
         }
     }
 
@@ -43,6 +47,18 @@ impl IslandFinder {
         let (a, b) = (self.root(a), self.root(b));
         let (low, high) = (a.min(b), a.max(b));
         self.parents[high as usize] = low;
+    }
+
+    /// Notes, when all ties are known, that the island of a body cannot sleep.
+    pub fn keep_awake(&mut self, body: u32) {
+        let root = self.root(body);
+        self.busy[root as usize] = true;
+    }
+
+    /// The island of a body, unless some body keeps it awake.
+    pub fn idle_root(&mut self, body: u32) -> Option<u32> {
+        let root = self.root(body);
+        (!self.busy[root as usize]).then_some(root)
     }
 }
 

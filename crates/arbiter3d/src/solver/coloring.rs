@@ -155,6 +155,11 @@ impl RowPlan {
         self.sort(counts);
     }
 
+    /// The bodies of each arbiter of the step, and whether both move.
+    pub fn ties(&self) -> impl Iterator<Item = ([u32; 2], bool)> + '_ {
+        self.records.iter().map(|record| (record.bodies, record.moves == [true; 2]))
+    }
+
     /// Whether a row acts on a body that moves.
     #[inline(always)]
     pub fn constrains(&self, body: usize) -> bool {

@@ -120,26 +120,43 @@ impl World {
 
     /// Puts to sleep the islands whose bodies have all rested long enough.
     pub(crate) fn sleep_islands(&mut self) {
-        let rested = |world: &Self, body: u32| world.bodies[body as usize].sleep_time >= world.settings.time_to_sleep;
         if !self.settings.allow_sleep || !self.scratch.any_rested {
             return;
         }
-        let mut finder = std::mem::take(&mut self.finder);
-        self.join_islands(&mut finder);
         let mut members = std::mem::take(&mut self.member_scratch);
-        members.clear();
-        members.extend(self.awake.iter().map(|&body| (finder.root(body), body)));
+        self.find_idle(&mut members);
         members.sort_unstable();
-        self.finder = finder;
         for island in members.chunk_by(|a, b| a.0 == b.0) {
-            if island.iter().all(|&(_, body)| rested(self, body) && !self.is_carried(body)) {
+            if island.iter().all(|&(_, body)| !self.is_carried(body)) {
                 self.sleep_island(island);
             }
         }
+        members.clear();
         self.member_scratch = members;
     }
 
-    /// Joins awake bodies along their contacts.
+    /// Bodies of the islands all of whose bodies have rested long enough, each with the root of its island.
+    ///
+    /// The ties are those of the step's rows: what has ended since then ties for one step more, and what has begun since then
+    /// has woken its bodies.
+    fn find_idle(&mut self, members: &mut Vec<(u32, u32)>) {
+        let (finder, bodies) = (&mut self.finder, &self.bodies);
+        finder.reset(bodies.len(), self.awake.iter().copied());
+        for ([a, b], both_move) in self.plan.ties() {
+            if both_move || (bodies[a as usize].is_dynamic() && bodies[b as usize].is_dynamic()) {
+                finder.join(a, b);
+            }
+        }
+        for &body in &self.awake {
+            if bodies[body as usize].sleep_time < self.settings.time_to_sleep {
+                finder.keep_awake(body);
+            }
+        }
+        crate::storage::reserve(members, self.awake.len());
+        members.extend(self.awake.iter().filter_map(|&body| Some((finder.idle_root(body)?, body))));
+    }
+
+    /// Joins awake bodies along their contacts as they are now.
     fn join_islands(&mut self, finder: &mut crate::island::IslandFinder) {
         finder.reset(self.bodies.len(), self.awake.iter().copied());
         self.arbiters.awake_by_key();
