@@ -17,9 +17,9 @@ use super::polyhedron::Polyhedron;
 use super::triangle::{Frame, Group, Reach, Solid, Triangle, feature_id, parallel_part};
 #[cfg(test)]
 use super::triangle_lanes::BACKWARD;
-use super::triangle_lanes::{EdgeSearch, FaceSearch, Overlaps, Planes, Search};
+use super::triangle_lanes::{EdgeSearch, FaceSearch, Near, Overlaps, Planes, Search};
 use crate::math::{Aabb, Real, Vec3, clamp, max, max3, min, min3};
-use crate::shape::{Facet, LEAF as LANES, TriangleMesh};
+use crate::shape::{Facet, LEAF as LANES, Plane, TriangleMesh};
 use crate::simd::{LaneVec3, Lanes};
 
 /// An edge, or the face, of a triangle lies level with its highest corner below this sine.
@@ -45,9 +45,14 @@ const BIAS: Real = 0.02;
 pub(super) struct Solids<'a> {
     features: Polyhedron<'a>,
     bounds: Aabb,
+    /// Its first planes in the axes of the mesh.
+    turned: [Plane; MOST_TURNED],
     underside: Underside,
     pending: Pending,
 }
+
+/// Faces against which triangles are tried as they come from the tree.
+const MOST_TURNED: usize = 16;
 
 /// Triangles that have no gap along any face and whose edges are to be tried, eight at a time.
 struct Pending {
@@ -91,7 +96,8 @@ impl<'a> Solids<'a> {
             found: Overlaps::default(),
             count: 0,
         };
-        Self { features, bounds, underside: Underside::NONE, pending }
+        let turned = [Plane { normal: Vec3::ZERO, offset: 0.0 }; MOST_TURNED];
+        Self { features, bounds, turned, underside: Underside::NONE, pending }
     }
 
     fn search<'b>(
@@ -118,17 +124,21 @@ impl Solid for Solids<'_> {
         self.bounds
     }
 
-    #[inline(always)]
-    fn keep_reached<W: Lanes<LANES>>(&self, sides: W, planes: &Planes<W>, margin: Real) -> W {
-        let mut sides = planes.keep_low(sides, self.features.vertices, 0.0);
-        if sides.abs().positive() == 0 {
-            return sides;
+    fn place(&mut self, frame: &Frame) {
+        for (turned, plane) in self.turned.iter_mut().zip(self.features.planes) {
+            *turned = Plane { normal: frame.rotation * plane.normal, offset: plane.offset };
         }
+    }
+
+    #[inline(always)]
+    fn keep_reached<W: Lanes<LANES>>(&self, near: &Near, sides: W, planes: &Planes<W>) -> W {
+        let mut sides = sides;
         let [a, b, c] = &planes.corners;
-        for plane in self.features.planes {
+        let gap = near.reach.margin + near.slack();
+        for plane in &self.turned[..self.features.planes.len().min(MOST_TURNED)] {
             let outward = LaneVec3::splat(plane.normal);
             let lowest = outward.dot(a).min(outward.dot(b).min(outward.dot(c)));
-            sides = W::splat(plane.offset + margin).if_at_least(lowest, sides, W::ZERO);
+            sides = W::splat(plane.offset + gap).if_at_least(lowest, sides, W::ZERO);
         }
         sides
     }
@@ -292,7 +302,9 @@ impl Pair<'_> {
         if number <= faces {
             return Axis::Face { face: number - 1 };
         }
-        let (edge, solid_edge) = ((number - 1 - faces) / edges, 2 * ((number - 1 - faces) % edges));
+        let number = number - 1 - faces;
+        let edge = (self.triangle.longest_edge() + number / edges) % 3;
+        let solid_edge = 2 * (number % edges);
         let (start, end) = self.triangle.edge(edge);
         match self.edge_normal(end - start, solid_edge) {
             Some(normal) => Axis::Edges { edge, solid_edge, normal },
@@ -318,7 +330,8 @@ impl Pair<'_> {
                 return None;
             }
         }
-        for edge in 0..3 {
+        for k in 0..3 {
+            let edge = (self.triangle.longest_edge() + k) % 3;
             let (start, end) = self.triangle.edge(edge);
             let along = end - start;
             for solid_edge in (0..self.solid.edges.len()).step_by(2) {
