@@ -19,7 +19,7 @@ use super::triangle::{Frame, Group, Reach, Solid, Triangle, feature_id, parallel
 use super::triangle_lanes::BACKWARD;
 use super::triangle_lanes::{EdgeSearch, FaceSearch, Near, Overlaps, Planes, Search};
 use crate::math::{Aabb, Real, Vec3, clamp, max, max3, min, min3};
-use crate::shape::{Facet, LEAF as LANES, Plane, TriangleMesh};
+use crate::shape::{Facet, LEAF as LANES, TriangleMesh};
 use crate::simd::{LaneVec3, Lanes};
 
 /// An edge, or the face, of a triangle lies level with its highest corner below this sine.
@@ -45,14 +45,25 @@ const BIAS: Real = 0.02;
 pub(super) struct Solids<'a> {
     features: Polyhedron<'a>,
     bounds: Aabb,
-    /// Its first planes in the axes of the mesh.
-    turned: [Plane; MOST_TURNED],
+    /// Between what planes it lies, in the axes of the mesh: all of its faces or the first of them.
+    slabs: [Slab; MOST_SLABS],
+    slab_count: usize,
     underside: Underside,
     pending: Pending,
 }
 
-/// Faces against which triangles are tried as they come from the tree.
-const MOST_TURNED: usize = 16;
+/// The points with `low ≤ normal · x ≤ high`: two opposite faces, or one with nothing opposite.
+#[derive(Clone, Copy)]
+struct Slab {
+    normal: Vec3,
+    low: Real,
+    high: Real,
+}
+
+/// Slabs against which triangles are tried as they come from the tree.
+const MOST_SLABS: usize = 16;
+/// Square of the angle up to which faces are opposite: what it moves a corner by is less than rounding is given.
+const OPPOSITE: Real = 1e-12;
 
 /// Triangles that have no gap along any face and whose edges are to be tried, eight at a time.
 struct Pending {
@@ -96,8 +107,8 @@ impl<'a> Solids<'a> {
             found: Overlaps::default(),
             count: 0,
         };
-        let turned = [Plane { normal: Vec3::ZERO, offset: 0.0 }; MOST_TURNED];
-        Self { features, bounds, turned, underside: Underside::NONE, pending }
+        let slabs = [Slab { normal: Vec3::ZERO, low: 0.0, high: 0.0 }; MOST_SLABS];
+        Self { features, bounds, slabs, slab_count: 0, underside: Underside::NONE, pending }
     }
 
     fn search<'b>(
@@ -125,8 +136,16 @@ impl Solid for Solids<'_> {
     }
 
     fn place(&mut self, frame: &Frame) {
-        for (turned, plane) in self.turned.iter_mut().zip(self.features.planes) {
-            *turned = Plane { normal: frame.rotation * plane.normal, offset: plane.offset };
+        self.slab_count = 0;
+        for plane in self.features.planes {
+            let normal = frame.rotation * plane.normal;
+            let slabs = &mut self.slabs[..self.slab_count];
+            if let Some(slab) = slabs.iter_mut().find(|slab| (slab.normal + normal).length_squared() < OPPOSITE) {
+                slab.low = max(slab.low, -plane.offset);
+            } else if self.slab_count < MOST_SLABS {
+                self.slabs[self.slab_count] = Slab { normal, low: -Real::MAX, high: plane.offset };
+                self.slab_count += 1;
+            }
         }
     }
 
@@ -135,10 +154,11 @@ impl Solid for Solids<'_> {
         let mut sides = sides;
         let [a, b, c] = &planes.corners;
         let gap = near.reach.margin + near.slack();
-        for plane in &self.turned[..self.features.planes.len().min(MOST_TURNED)] {
-            let outward = LaneVec3::splat(plane.normal);
-            let lowest = outward.dot(a).min(outward.dot(b).min(outward.dot(c)));
-            sides = W::splat(plane.offset + gap).if_at_least(lowest, sides, W::ZERO);
+        for slab in &self.slabs[..self.slab_count] {
+            let outward = LaneVec3::splat(slab.normal);
+            let (a, b, c) = (outward.dot(a), outward.dot(b), outward.dot(c));
+            sides = W::splat(slab.high + gap).if_at_least(a.min(b.min(c)), sides, W::ZERO);
+            sides = a.max(b.max(c)).if_at_least(W::splat(slab.low - gap), sides, W::ZERO);
         }
         sides
     }
