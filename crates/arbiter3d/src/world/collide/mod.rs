@@ -57,6 +57,7 @@ struct CollideContext<'a> {
     solver: &'a SolverBodies,
     broad_phase: &'a crate::broad_phase::BroadPhase,
     settings: &'a WorldSettings,
+    level: SimdLevel,
     filters: &'a UserFilters,
     /// Shapes whose proxies have moved since the last narrow phase.
     moved: &'a [bool],
@@ -138,6 +139,7 @@ impl World {
             solver: &self.solver_bodies,
             broad_phase: &self.broad_phase,
             settings: &self.scaled,
+            level: self.level,
             filters: &self.filters,
             moved: &self.moved_shapes,
             dt,
@@ -169,8 +171,6 @@ impl World {
         let (key, pair_index) = (begin.key, begin.pair);
         let pair = &self.pairs[pair_index as usize];
         let [b1, b2] = pair.bodies;
-        let [center1, center2] = [b1, b2].map(|body| self.solver_bodies.masses[body as usize].pose());
-        let between = center1.relative(&center2);
         let reusable = self.filters.contact.is_none();
         let ids = [self.body_id(b1), self.body_id(b2)];
         let index = match self.arbiters.find(key) {
@@ -181,10 +181,10 @@ impl World {
         };
         let arbiter = self.arbiters.at_mut(index);
         arbiter.pair = pair_index;
-        let rotations = [center1.rotation, center2.rotation];
+        let rotations = [b1, b2].map(|body| self.solver_bodies.masses[body as usize].rotation);
         update_contacts(&mut arbiter.data, &begin.places, rotations, self.scaled.contact_break_distance);
         let pair = &mut self.pairs[pair_index as usize];
-        (pair.arbiter, pair.has_manifold, pair.manifold_pose) = (index, reusable, between);
+        (pair.arbiter, pair.has_manifold) = (index, reusable);
         self.mix_shape_materials(index);
     }
 }
