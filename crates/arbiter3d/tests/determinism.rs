@@ -22,7 +22,7 @@ use common::*;
 const GOLDEN: [(&str, u64); 6] = [
     ("pile", 0x42e7_ab26_17ea_9aca),
     ("hulls", 0x0a88_1418_2fc6_fb43),
-    ("mesh rain", 0x4147_e044_0055_2920),
+    ("mesh rain", 0x0bd1_8e98_0e36_4cb3),
     ("bullets", 0x7fb2_f672_9f26_c0dc),
     ("custom contacts", 0xc12c_c4b6_3d57_60df),
     ("coming and going", 0x7fb4_041e_7a6b_f33d),

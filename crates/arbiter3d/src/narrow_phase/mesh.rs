@@ -62,6 +62,7 @@ impl Contact<'_> {
         let scale = if self.margin > 0.0 { crate::math::min(self.margin, inner) } else { 0.02 * inner };
         let frame = Frame { rotation, inverse: rotation.transpose(), position: self.pose.position, scale };
         let mut reach = Reach { margin: self.margin, scale, second_look: false };
+        solid.place(&frame);
         let mut candidates = Candidates::new(0.02 * scale);
         let missing = self.touch_all(solid, &frame, &reach, &mut candidates);
         if missing && candidates.deepest() > 0.0 {

@@ -7,7 +7,7 @@
 //! the face beside it, with the plane's own distance, and never the edge: seams inside a surface are not felt.
 
 use super::mesh_points::{Candidate, Candidates, NO_FACET};
-use super::triangle_lanes::Planes;
+use super::triangle_lanes::{Near, Planes};
 use crate::math::{Aabb, Mat3, Real, Vec3, abs3, clamp, max, max3, min, min3};
 use crate::shape::{Capsule, Facet, LEAF as LANES, Sphere, Surroundings, TriangleMesh};
 use crate::simd::Lanes;
@@ -109,6 +109,13 @@ impl<'a> Triangle<'a> {
     #[inline(always)]
     pub(super) fn edge(&self, i: usize) -> (Vec3, Vec3) {
         (self.corners[i], self.corners[(i + 1) % 3])
+    }
+
+    /// The edge that is longest, the first of several.
+    pub(super) fn longest_edge(&self) -> usize {
+        let squared = |i: usize| (self.corners[(i + 1) % 3] - self.corners[i]).length_squared();
+        let (ab, bc, ca) = (squared(0), squared(1), squared(2));
+        if ca > max(ab, bc) { 2 } else { usize::from(bc > ab) }
     }
 
     /// Whether the surface goes on flat across an edge that cut something off: the neighbour has the rest, so where it
@@ -271,8 +278,10 @@ pub(super) trait Solid {
     fn inner_radius(&self) -> Real;
     /// The box around the shape in its frame.
     fn bounds(&self) -> Aabb;
+    /// Makes ready for [`Solid::keep_reached`].
+    fn place(&mut self, _frame: &Frame) {}
     /// Zero where a triangle is farther than the margin, as far as can be told at a small cost.
-    fn keep_reached<W: Lanes<LANES>>(&self, sides: W, planes: &Planes<W>, margin: Real) -> W;
+    fn keep_reached<W: Lanes<LANES>>(&self, near: &Near, sides: W, planes: &Planes<W>) -> W;
     /// Adds the points of the triangles of a group, which is empty after it, or keeps some for [`Solid::finish`]. Returns
     /// whether one might overlap the shape but gave no point, because it is the neighbours' matter: if they give none
     /// either, it is looked at again.
@@ -304,8 +313,8 @@ impl Solid for Sphere {
     }
 
     #[inline(always)]
-    fn keep_reached<W: Lanes<LANES>>(&self, sides: W, planes: &Planes<W>, _margin: Real) -> W {
-        planes.keep_low(sides, &[Vec3::ZERO], self.radius())
+    fn keep_reached<W: Lanes<LANES>>(&self, near: &Near, sides: W, planes: &Planes<W>) -> W {
+        near.keep_in_box(planes.keep_low(sides, &[Vec3::ZERO], self.radius()), planes)
     }
 
     fn touch_group(
@@ -387,9 +396,9 @@ impl Solid for Capsule {
     }
 
     #[inline(always)]
-    fn keep_reached<W: Lanes<LANES>>(&self, sides: W, planes: &Planes<W>, _margin: Real) -> W {
-        let end = Vec3::new(0.0, self.half_length(), 0.0);
-        planes.keep_low(sides, &[-end, end], self.radius())
+    fn keep_reached<W: Lanes<LANES>>(&self, near: &Near, sides: W, planes: &Planes<W>) -> W {
+        let end = near.frame.rotation.y_axis * self.half_length();
+        near.keep_in_box(planes.keep_low(sides, &[-end, end], self.radius()), planes)
     }
 
     fn touch_group(

@@ -60,19 +60,27 @@ impl Near<'_> {
         let height = normal.dot(&(LaneVec3::splat(self.center - self.frame.position) - a));
         let (behind, other) = if self.one_sided { (-self.behind, 0.0) } else { (0.0, -1.0) };
         let sides = height.if_at_least(W::splat(behind) * length, W::splat(1.0), W::splat(other));
-        let local = turn_corners(&self.frame.inverse, &[a, b, c]);
-        let sides = keep_overlapping(sides, &local, &self.bounds);
-        if sides.abs().positive() == 0 {
-            return sides;
-        }
-        let normal = turn(&self.frame.inverse, &normal);
-        let reached = self.reach.margin + Self::SLACK * self.size;
-        let planes = Planes { corners: local, normal: normal.scale(sides), gap: W::splat(reached) * length, length };
-        solid.keep_reached(sides, &planes, self.reach.margin)
+        let gap = W::splat(self.reach.margin + self.slack()) * length;
+        solid.keep_reached(self, sides, &Planes { corners: [a, b, c], normal: normal.scale(sides), length, gap })
+    }
+
+    /// What rounding may make of distances of points beside the shape, metres.
+    #[inline(always)]
+    pub(super) fn slack(&self) -> Real {
+        Self::SLACK * self.size
+    }
+
+    /// Zero where a triangle is outside the box around the shape.
+    #[inline(always)]
+    pub(super) fn keep_in_box<W: Number>(&self, sides: W, planes: &Planes<W>) -> W {
+        let [a, b, c] = turn_corners(&self.frame.inverse, &planes.corners);
+        let sides = keep_between(sides, [a.x, b.x, c.x], self.bounds.min.x, self.bounds.max.x);
+        let sides = keep_between(sides, [a.y, b.y, c.y], self.bounds.min.y, self.bounds.max.y);
+        keep_between(sides, [a.z, b.z, c.z], self.bounds.min.z, self.bounds.max.z)
     }
 }
 
-/// Triangles in the frame of the shape, and their planes.
+/// Triangles as seen from the shape's position, in the mesh's axes, and their planes.
 pub(super) struct Planes<W> {
     pub(super) corners: [LaneVec3<W>; 3],
     /// Towards the side of the shape, as long as twice the triangle's area.
@@ -102,15 +110,6 @@ fn keep_reached<W: Number>(found: W, center: W, half: W, [middle, reach]: [Real;
     (half + W::splat(reach) + slack).if_at_least((center - W::splat(middle)).abs(), found, W::ZERO)
 }
 
-/// Zero where the box around the corners does not overlap the given one.
-#[inline(always)]
-fn keep_overlapping<W: Number>(sides: W, corners: &[LaneVec3<W>; 3], aabb: &Aabb) -> W {
-    let [a, b, c] = corners;
-    let sides = keep_between(sides, [a.x, b.x, c.x], aabb.min.x, aabb.max.x);
-    let sides = keep_between(sides, [a.y, b.y, c.y], aabb.min.y, aabb.max.y);
-    keep_between(sides, [a.z, b.z, c.z], aabb.min.z, aabb.max.z)
-}
-
 /// Zero where three numbers are all below `low` or all above `high`.
 #[inline(always)]
 fn keep_between<W: Number>(sides: W, [a, b, c]: [W; 3], low: Real, high: Real) -> W {
@@ -128,8 +127,8 @@ pub(super) struct Overlaps {
     pub(super) corner: [Real; LANES],
     /// Along the axis of least overlap.
     pub(super) separation: [Real; LANES],
-    /// 0 for the triangle's face; then the solid's faces; then its edges (one half of each) with the triangle's first,
-    /// second and third edge.
+    /// 0 for the triangle's face; then the solid's faces; then its edges (one half of each) with the triangle's longest
+    /// edge and the two after it.
     pub(super) axis: [Real; LANES],
     /// 1 where the solid's lowest corner is within the margin of the triangle's plane and no axis that was tried shows a
     /// gap beyond it, else 0.
@@ -251,6 +250,9 @@ impl KernelOfEight for EdgeSearch<'_> {
             bias,
         };
         let mut slopes = [W::ZERO; MOST_SLOPES];
+        // In a regular mesh the longest edges are parallel, and so are those that follow: edges of the solid that are no
+        // match for one triangle's edge are none for the others' either.
+        let corners = longest_first(&corners);
         for edge in 0..3 {
             if best.near.positive() == 0 {
                 break;
@@ -264,6 +266,28 @@ impl KernelOfEight for EdgeSearch<'_> {
         self.found.separation = best.separation.to_array();
         self.found.axis = best.axis.to_array();
         self.found.near = near.to_array();
+    }
+}
+
+/// The corners in turn, from the one where the longest edge starts.
+#[inline(always)]
+fn longest_first<W: Number>(corners: &[LaneVec3<W>; 3]) -> [LaneVec3<W>; 3] {
+    let [a, b, c] = corners;
+    let (ab, bc, ca) = (*b - *a, *c - *b, *a - *c);
+    let (ab, bc, ca) = (ab.dot(&ab), bc.dot(&bc), ca.dot(&ca));
+    // Positive where the second or the third edge is the longest.
+    let second = bc.if_above(ab, W::splat(1.0), W::ZERO);
+    let third = ca.if_above(ab.max(bc), W::splat(1.0), W::ZERO);
+    [pick(second, third, [a, b, c]), pick(second, third, [b, c, a]), pick(second, third, [c, a, b])]
+}
+
+/// The first vector, but the second where `second` is positive, and the third where `third` is.
+#[inline(always)]
+fn pick<W: Number>(second: W, third: W, [a, b, c]: [&LaneVec3<W>; 3]) -> LaneVec3<W> {
+    LaneVec3 {
+        x: third.if_positive(c.x, second.if_positive(b.x, a.x)),
+        y: third.if_positive(c.y, second.if_positive(b.y, a.y)),
+        z: third.if_positive(c.z, second.if_positive(b.z, a.z)),
     }
 }
 

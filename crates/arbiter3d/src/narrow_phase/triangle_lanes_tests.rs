@@ -96,7 +96,8 @@ fn sifting_keeps_what_overlaps_both_boxes_on_the_right_side() {
         let bounds = Aabb::from_center(Vec3::ZERO, Vec3::new(0.5, 0.2, 0.3));
         let one_sided = round % 2 == 0;
         let cuboid = CuboidFeatures::new(&Cuboid::new(Vec3::new(0.49, 0.19, 0.29)).unwrap());
-        let solid = Solids::new(cuboid.view());
+        let mut solid = Solids::new(cuboid.view());
+        solid.place(&frame);
         let reach = Reach { margin: 0.01, scale: 0.01, second_look: false };
         let near =
             Near { frame: &frame, reach: &reach, bounds, size: 0.5, center: pose.position, one_sided, behind: 0.002 };
@@ -106,16 +107,16 @@ fn sifting_keeps_what_overlaps_both_boxes_on_the_right_side() {
             for (index, side) in (first..first + leaf).zip(sides) {
                 let (corners, normal) = (mesh.corners(index), mesh.facet(index).normal());
                 let height = normal.dot(pose.position - corners[0]);
-                let turned = frame.inverse * normal;
-                let reach = turned.abs().dot(Vec3::new(0.49, 0.19, 0.29)) + 0.01;
                 let local = corners.map(|corner| frame.inverse * (corner - frame.position));
-                let near_by = Aabb::from_points(local).overlaps(&near.bounds);
+                let around = Aabb::from_points(local);
+                let inner = Aabb::from_center(bounds.center(), bounds.half_extents() - Vec3::splat(1e-4));
+                let outer = bounds.expand(1e-4);
                 let front = height >= if one_sided { -near.behind } else { 0.0 };
                 let back = if one_sided { 0.0 } else { -1.0 };
                 let expected = if front { 1.0 } else { back };
-                if !near_by || height * expected > 1.0001 * reach {
+                if !around.overlaps(&outer) {
                     assert_eq!(side, 0.0, "triangle {index}, height {height}");
-                } else if height * expected < 0.9999 * reach && (height + near.behind).abs().min(height.abs()) > 1e-6 {
+                } else if around.overlaps(&inner) && (height + near.behind).abs().min(height.abs()) > 1e-6 {
                     assert_eq!(side, expected, "triangle {index}, height {height}");
                 }
                 kept += usize::from(side > 0.0);

@@ -17,7 +17,7 @@ use super::polyhedron::Polyhedron;
 use super::triangle::{Frame, Group, Reach, Solid, Triangle, feature_id, parallel_part};
 #[cfg(test)]
 use super::triangle_lanes::BACKWARD;
-use super::triangle_lanes::{EdgeSearch, FaceSearch, Overlaps, Planes, Search};
+use super::triangle_lanes::{EdgeSearch, FaceSearch, Near, Overlaps, Planes, Search};
 use crate::math::{Aabb, Real, Vec3, clamp, max, max3, min, min3};
 use crate::shape::{Facet, LEAF as LANES, TriangleMesh};
 use crate::simd::{LaneVec3, Lanes};
@@ -45,9 +45,25 @@ const BIAS: Real = 0.02;
 pub(super) struct Solids<'a> {
     features: Polyhedron<'a>,
     bounds: Aabb,
+    /// Between what planes it lies, in the axes of the mesh: all of its faces or the first of them.
+    slabs: [Slab; MOST_SLABS],
+    slab_count: usize,
     underside: Underside,
     pending: Pending,
 }
+
+/// The points with `low ≤ normal · x ≤ high`: two opposite faces, or one with nothing opposite.
+#[derive(Clone, Copy)]
+struct Slab {
+    normal: Vec3,
+    low: Real,
+    high: Real,
+}
+
+/// Slabs against which triangles are tried as they come from the tree.
+const MOST_SLABS: usize = 16;
+/// Square of the angle up to which faces are opposite: what it moves a corner by is less than rounding is given.
+const OPPOSITE: Real = 1e-12;
 
 /// Triangles that have no gap along any face and whose edges are to be tried, eight at a time.
 struct Pending {
@@ -91,7 +107,8 @@ impl<'a> Solids<'a> {
             found: Overlaps::default(),
             count: 0,
         };
-        Self { features, bounds, underside: Underside::NONE, pending }
+        let slabs = [Slab { normal: Vec3::ZERO, low: 0.0, high: 0.0 }; MOST_SLABS];
+        Self { features, bounds, slabs, slab_count: 0, underside: Underside::NONE, pending }
     }
 
     fn search<'b>(
@@ -118,17 +135,30 @@ impl Solid for Solids<'_> {
         self.bounds
     }
 
-    #[inline(always)]
-    fn keep_reached<W: Lanes<LANES>>(&self, sides: W, planes: &Planes<W>, margin: Real) -> W {
-        let mut sides = planes.keep_low(sides, self.features.vertices, 0.0);
-        if sides.abs().positive() == 0 {
-            return sides;
-        }
-        let [a, b, c] = &planes.corners;
+    fn place(&mut self, frame: &Frame) {
+        self.slab_count = 0;
         for plane in self.features.planes {
-            let outward = LaneVec3::splat(plane.normal);
-            let lowest = outward.dot(a).min(outward.dot(b).min(outward.dot(c)));
-            sides = W::splat(plane.offset + margin).if_at_least(lowest, sides, W::ZERO);
+            let normal = frame.rotation * plane.normal;
+            let slabs = &mut self.slabs[..self.slab_count];
+            if let Some(slab) = slabs.iter_mut().find(|slab| (slab.normal + normal).length_squared() < OPPOSITE) {
+                slab.low = max(slab.low, -plane.offset);
+            } else if self.slab_count < MOST_SLABS {
+                self.slabs[self.slab_count] = Slab { normal, low: -Real::MAX, high: plane.offset };
+                self.slab_count += 1;
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn keep_reached<W: Lanes<LANES>>(&self, near: &Near, sides: W, planes: &Planes<W>) -> W {
+        let mut sides = sides;
+        let [a, b, c] = &planes.corners;
+        let gap = near.reach.margin + near.slack();
+        for slab in &self.slabs[..self.slab_count] {
+            let outward = LaneVec3::splat(slab.normal);
+            let (a, b, c) = (outward.dot(a), outward.dot(b), outward.dot(c));
+            sides = W::splat(slab.high + gap).if_at_least(a.min(b.min(c)), sides, W::ZERO);
+            sides = a.max(b.max(c)).if_at_least(W::splat(slab.low - gap), sides, W::ZERO);
         }
         sides
     }
@@ -292,7 +322,9 @@ impl Pair<'_> {
         if number <= faces {
             return Axis::Face { face: number - 1 };
         }
-        let (edge, solid_edge) = ((number - 1 - faces) / edges, 2 * ((number - 1 - faces) % edges));
+        let number = number - 1 - faces;
+        let edge = (self.triangle.longest_edge() + number / edges) % 3;
+        let solid_edge = 2 * (number % edges);
         let (start, end) = self.triangle.edge(edge);
         match self.edge_normal(end - start, solid_edge) {
             Some(normal) => Axis::Edges { edge, solid_edge, normal },
@@ -318,7 +350,8 @@ impl Pair<'_> {
                 return None;
             }
         }
-        for edge in 0..3 {
+        for k in 0..3 {
+            let edge = (self.triangle.longest_edge() + k) % 3;
             let (start, end) = self.triangle.edge(edge);
             let along = end - start;
             for solid_edge in (0..self.solid.edges.len()).step_by(2) {

@@ -249,9 +249,18 @@ impl TriangleMesh {
     #[inline(always)]
     pub(crate) fn corners_of_leaf<W: Lanes<LEAF>>(&self, first: usize, count: usize) -> [LaneVec3<W>; 3] {
         let around = &self.surroundings[first..first + count];
+        let mut ids = [0; LEAF];
+        if let Ok(full) = <&[Surroundings; LEAF]>::try_from(around) {
+            for (id, around) in ids.iter_mut().zip(full) {
+                *id = around.id as usize;
+            }
+        } else {
+            for (lane, id) in ids.iter_mut().enumerate() {
+                *id = around[lane.min(count - 1)].id as usize;
+            }
+        }
         let mut triangles = [&[0; 3]; LEAF];
-        for (lane, triangle) in triangles.iter_mut().enumerate() {
-            let id = around[lane.min(count - 1)].id as usize;
+        for (triangle, &id) in triangles.iter_mut().zip(&ids) {
             debug_assert!(id < self.triangles.len());
             // SAFETY: the ids are the numbers of the triangles in another order, and neither list changes.
             *triangle = unsafe { self.triangles.get_unchecked(id) };

@@ -18,7 +18,7 @@ pub(super) const WIDTH: usize = 8;
 pub(crate) const LEAF: usize = 8;
 /// Nodes on the way to a leaf at most: a child either holds at most half of the triangles of its parent or came from seven
 /// cuts, of which at most 31 in a row are uneven.
-const MOST_LEVELS: usize = 48;
+const MOST_LEVELS: usize = 40;
 
 /// A node of the tree: the boxes of its children, side by side.
 #[derive(Clone, Copy, Debug)]
