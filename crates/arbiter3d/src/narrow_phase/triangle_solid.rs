@@ -186,10 +186,10 @@ impl Solid for Solids<'_> {
         let shallow = if reach.second_look { -Real::MAX } else { SHALLOW * self.features.inner_radius };
         let found = FaceSearch { search, wanted, sharp, shallow }.find();
         let mut missing = false;
-        for k in 0..count {
+        for (k, facet) in facets.iter().enumerate().take(count) {
             if found.near[k] > 0.0 {
                 let place = self.pending.count;
-                self.pending.facets[place] = facets[k];
+                self.pending.facets[place] = *facet;
                 self.pending.indices[place] = group.indices[k];
                 self.pending.sides[place] = group.sides[k];
                 self.pending.found.take(place, &found, k);
