@@ -248,14 +248,14 @@ impl ArbiterStore {
         let heads = bodies.map(|body| self.heads.get(body as usize).copied().unwrap_or(NONE));
         let heads = heads.map(|head| self.arbiters.get((head >> 1) as usize));
         for arbiter in [place, heads[0], heads[1]].into_iter().flatten() {
-            crate::simd::prefetch(arbiter);
+            crate::simd::prefetch(&arbiter.next);
         }
     }
 
     /// Asks for the names and links of an arbiter.
     #[inline]
     pub fn prefetch_links(&self, index: u32) {
-        crate::simd::prefetch(&self.arbiters[index as usize]);
+        crate::simd::prefetch(&self.arbiters[index as usize].next);
     }
 
     /// Asks for what ending an arbiter will touch, once its links are there.
@@ -265,19 +265,27 @@ impl ArbiterStore {
         self.by_key.prefetch(arbiter.key.hash());
         for edge in arbiter.next.into_iter().chain(arbiter.previous) {
             if let Some(neighbour) = self.arbiters.get((edge >> 1) as usize) {
-                crate::simd::prefetch(neighbour);
+                crate::simd::prefetch(&neighbour.next);
             }
         }
     }
 
-    /// Makes an arbiter; the key must be free and the bodies different.
+    /// Makes an arbiter.
+    #[cfg(test)]
     pub fn create(&mut self, key: ArbiterKey, body1: BodyId, body2: BodyId) -> u32 {
+        let index = self.create_blank(key, body1, body2);
+        self.arbiters[index as usize].data = ContactData::default();
+        index
+    }
+
+    /// Makes an arbiter; the key must be free and the bodies different. Its data may be those of one that has ended.
+    pub fn create_blank(&mut self, key: ArbiterKey, body1: BodyId, body2: BodyId) -> u32 {
+        debug_assert!(self.find(key).is_none(), "{key:?} is in use");
         let index = self.free.pop().unwrap_or_else(|| self.add_place(key, body1, body2));
         let arbiter = &mut self.arbiters[index as usize];
         arbiter.id.generation = arbiter.id.generation.wrapping_add(1);
         (arbiter.key, arbiter.body1, arbiter.body2) = (key, body1, body2);
         (arbiter.alive, arbiter.begun, arbiter.awake, arbiter.pair) = (true, false, false, NONE);
-        arbiter.data = ContactData::default();
         let arbiters = &self.arbiters;
         self.by_key.insert(key.hash(), index, |place| arbiters[place as usize].key.hash());
         self.link(index, 0, body1.index);

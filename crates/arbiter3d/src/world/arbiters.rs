@@ -160,8 +160,14 @@ impl World {
 
     /// Makes an arbiter whose begin is still to be raised, and wakes its bodies.
     pub(crate) fn create_arbiter(&mut self, key: ArbiterKey, body1: BodyId, body2: BodyId) -> u32 {
-        let index = self.arbiters.create(key, body1, body2);
-        self.arbiters.at_mut(index).data.solve_mode = SolveMode::FULL;
+        let index = self.create_blank_arbiter(key, body1, body2);
+        self.arbiters.at_mut(index).data = fresh_data();
+        index
+    }
+
+    /// The same, but that the caller has still to give it [`fresh_data`].
+    pub(crate) fn create_blank_arbiter(&mut self, key: ArbiterKey, body1: BodyId, body2: BodyId) -> u32 {
+        let index = self.arbiters.create_blank(key, body1, body2);
         self.events.unbegun.push((key, self.arbiters.at(index).id));
         self.wake(body1.index);
         self.wake(body2.index);
@@ -254,6 +260,11 @@ impl World {
             }
         }
     }
+}
+
+/// Data of an arbiter that begins.
+pub(crate) fn fresh_data() -> ContactData {
+    ContactData { solve_mode: SolveMode::FULL, ..ContactData::default() }
 }
 
 /// Material of an engine arbiter, from its two shapes; what users have set stays.

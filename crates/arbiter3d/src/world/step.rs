@@ -222,6 +222,9 @@ impl World {
         let mut found = std::mem::take(&mut self.scratch.pairs);
         self.search_pairs(&mut found);
         for (at, &(a, b)) in found.iter().enumerate() {
+            if let Some(&(a, b)) = found.get(at + 2 * FOUND_AHEAD) {
+                [a, b].into_iter().for_each(|slot| prefetch(&self.shapes[slot as usize]));
+            }
             if let Some(&(a, b)) = found.get(at + FOUND_AHEAD) {
                 self.prefetch_pair(a, b);
             }

@@ -11,7 +11,7 @@ use crate::parallel::{SharedSlice, StagePool};
 use crate::storage;
 
 /// From one leaf in so many on, moved leaves are lifted together.
-const BULK_SHARE: usize = 8;
+const BULK_SHARE: usize = 32;
 /// Subtrees to cut a tree into: several for each thread, as they differ in size.
 const SUBTREES: usize = 64;
 /// Leaves or nodes that a thread takes at a time at least.

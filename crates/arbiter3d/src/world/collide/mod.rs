@@ -14,7 +14,7 @@ mod block;
 mod contacts;
 
 use super::World;
-use super::arbiters::mix_shape_materials;
+use super::arbiters::{fresh_data, mix_shape_materials};
 use super::bodies::Body;
 use super::filters::UserFilters;
 use super::pairs::Pair;
@@ -56,6 +56,8 @@ struct Begin {
     bodies: [u32; 2],
     /// Once it is made.
     arbiter: u32,
+    /// Whether the user had not made it before.
+    is_new: bool,
     places: Places,
 }
 
@@ -183,6 +185,7 @@ impl World {
                 prefetch(&self.pairs[later.pair as usize].arbiter);
                 for body in later.bodies {
                     prefetch(&self.bodies[body as usize].island);
+                    prefetch(&self.bodies[body as usize].awake);
                 }
                 self.arbiters.prefetch_new(key, later.bodies, BEGINS_AHEAD);
             }
@@ -196,8 +199,11 @@ impl World {
     /// Makes the arbiter of a pair that begins to touch, without contacts.
     fn begin_pair(&mut self, begin: &mut Begin) {
         let ids = begin.bodies.map(|body| self.body_id(body));
-        begin.arbiter = match self.arbiters.find(begin.key) {
-            None => self.create_arbiter(begin.key, ids[0], ids[1]),
+        // The engine's own arbiters end with their pairs: only one of the user's can have the key already.
+        let present = if self.arbiters.custom > 0 { self.arbiters.find(begin.key) } else { None };
+        begin.is_new = present.is_none();
+        begin.arbiter = match present {
+            None => self.create_blank_arbiter(begin.key, ids[0], ids[1]),
             // The user has made an arbiter under the key of these shapes: it is theirs from now on.
             Some(index) if [self.arbiters.at(index).body1, self.arbiters.at(index).body2] == ids => index,
             Some(_) => return, // a key that was not reserved, in use between other bodies
@@ -218,6 +224,9 @@ impl World {
                 // SAFETY: a pair begins once, and an arbiter belongs to one pair.
                 let (pair, arbiter) =
                     unsafe { (pairs.get_mut(begin.pair as usize), arbiters.get_mut(begin.arbiter as usize)) };
+                if begin.is_new {
+                    arbiter.data = fresh_data();
+                }
                 let rotations = begin.bodies.map(|body| masses[body as usize].rotation);
                 update_contacts(&mut arbiter.data, &begin.places, rotations, break_distance);
                 pair.has_manifold = reusable;
