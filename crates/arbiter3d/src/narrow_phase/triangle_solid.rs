@@ -74,6 +74,18 @@ struct Pending {
     count: usize,
 }
 
+impl Pending {
+    /// Adds triangle `k` of a group; true when there is no room for another.
+    #[inline(always)]
+    fn push(&mut self, facet: &Facet, group: &Group, found: &Overlaps, k: usize) -> bool {
+        let place = self.count;
+        (self.facets[place], self.indices[place], self.sides[place]) = (*facet, group.indices[k], group.sides[k]);
+        self.found.take(place, found, k);
+        self.count += 1;
+        self.count == LANES
+    }
+}
+
 /// What of the solid is lowest over a triangle.
 #[derive(Clone, Copy)]
 struct Underside {
@@ -176,8 +188,8 @@ impl Solid for Solids<'_> {
             return false;
         }
         let (mut facets, mut wanted, mut sharp) = ([Facet::NONE; LANES], [0.0; LANES], [0.0; LANES]);
-        for k in 0..count {
-            let index = group.indices[k] as usize;
+        for (k, &index) in group.indices[..count].iter().enumerate() {
+            let index = index as usize;
             facets[k] = mesh.facet(index);
             wanted[k] = 1.0;
             sharp[k] = if mesh.surroundings(index).is_plain() { 0.0 } else { 1.0 };
@@ -186,17 +198,9 @@ impl Solid for Solids<'_> {
         let shallow = if reach.second_look { -Real::MAX } else { SHALLOW * self.features.inner_radius };
         let found = FaceSearch { search, wanted, sharp, shallow }.find();
         let mut missing = false;
-        for (k, facet) in facets.iter().enumerate().take(count) {
-            if found.near[k] > 0.0 {
-                let place = self.pending.count;
-                self.pending.facets[place] = *facet;
-                self.pending.indices[place] = group.indices[k];
-                self.pending.sides[place] = group.sides[k];
-                self.pending.found.take(place, &found, k);
-                self.pending.count += 1;
-                if self.pending.count == LANES {
-                    missing |= self.finish(mesh, frame, reach, out);
-                }
+        for (k, facet) in facets[..count].iter().enumerate() {
+            if found.near[k] > 0.0 && self.pending.push(facet, group, &found, k) {
+                missing |= self.finish(mesh, frame, reach, out);
             }
         }
         missing
