@@ -20,12 +20,12 @@ use common::*;
 
 /// The hashes of the scenes, in their order.
 const GOLDEN: [(&str, u64); 6] = [
-    ("pile", 0x42e7_ab26_17ea_9aca),
-    ("hulls", 0x0a88_1418_2fc6_fb43),
-    ("mesh rain", 0x0bd1_8e98_0e36_4cb3),
-    ("bullets", 0x7fb2_f672_9f26_c0dc),
-    ("custom contacts", 0xc12c_c4b6_3d57_60df),
-    ("coming and going", 0x7fb4_041e_7a6b_f33d),
+    ("pile", 0xb7f6_634b_cb96_8d93),
+    ("hulls", 0x7d4f_1a72_0999_6ad2),
+    ("mesh rain", 0x27a5_6373_5bcb_308a),
+    ("bullets", 0x2d02_9098_2f0f_1db2),
+    ("custom contacts", 0xf4d2_df3a_d912_e6b7),
+    ("coming and going", 0x38fd_f577_1f35_933f),
 ];
 
 /// A scene: how it begins, and what is done before each step.
