@@ -1,9 +1,10 @@
 //! Eight triangles of a mesh at once against a convex shape: which are near, and where a solid overlaps them least.
 //!
 //! All is told by arithmetic without branches, so it is done in lanes, and after each stage what is left is packed anew.
-//! [`Near`] drops boxes of the tree beside the shape's own box, then triangles outside that box, wholly below it or seen
-//! from behind. [`FaceSearch`] tries the faces of triangle and solid as separating axes and drops those with a gap beyond
-//! the margin, [`EdgeSearch`] the pairs of edges (see `triangle_solid`). What is left is held against the shape one by one.
+//! [`Near`] drops boxes of the tree beside the shape's own box, then triangles seen from behind and those that a first look
+//! tells to be out of reach: beyond a face of a solid, under a ball or a capsule. [`FaceSearch`] tries the faces of triangle
+//! and solid as separating axes and drops those with a gap beyond the margin, [`EdgeSearch`] the pairs of edges (see
+//! `triangle_solid`). What is left is held against the shape one by one.
 //!
 //! Lanes never mix and go through the operations of one triangle alone in the same order, so that a triangle's result does
 //! not depend on its neighbours in the group nor on the instructions that the machine has.
