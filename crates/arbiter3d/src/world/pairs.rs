@@ -11,6 +11,7 @@ use super::shapes::ShapeSlot;
 use crate::arbiter::{EndReason, NONE};
 use crate::math::{Pose, Real, Rotation, Vec3, max, min};
 use crate::narrow_phase::PairCache;
+use crate::shape::Shape;
 use crate::simd::{Quad, prefetch};
 use crate::storage;
 
@@ -44,6 +45,8 @@ pub(crate) struct Pair {
     pub size: Real,
     /// How far a pair without contact may turn (sine of half the angle) until its shapes are looked at again.
     apart_rotation: Real,
+    /// How far a pair with contacts may move until then, metres.
+    touch_distance: Real,
     pub cache: PairCache,
     next: [u32; 2],
     previous: [u32; 2],
@@ -54,6 +57,8 @@ const PARTED_AHEAD: usize = 4;
 
 /// How far a pair may move, in shares of the smaller shape's inner radius, before its manifold is made anew.
 const REUSE_TRANSLATION: Real = 0.02;
+/// The same for pairs of cuboids, whose manifolds cost little: their corners sink in less where they slide on.
+const REUSE_CUBOIDS: Real = 0.01;
 /// How far a pair may turn (sine of half the angle) before its manifold is made anew: 1.4°.
 pub(super) const REUSE_ROTATION: Real = 0.0125;
 
@@ -106,7 +111,7 @@ impl Pair {
             // The end of a long shape moves farther than its own thickness by turning: `1 / reach` is known from
             // `apart_rotation`.
             let by_reach = REUSE_REACH * self.size * (8.0 * self.apart_rotation / speculative_distance);
-            (REUSE_TRANSLATION * self.size, min(REUSE_ROTATION, by_reach))
+            (self.touch_distance, min(REUSE_ROTATION, by_reach))
         }
     }
 
@@ -196,6 +201,8 @@ impl World {
         let shapes = if smaller_first { [a, b] } else { [b, a] };
         let bodies = shapes.map(|slot| self.shapes[slot as usize].body);
         let reach = |side: usize| self.shapes[shapes[side] as usize].reach;
+        let size = self.smaller_radius(shapes);
+        let cuboids = shapes.iter().all(|&slot| matches!(self.shapes[slot as usize].geometry, Shape::Cuboid(_)));
         let pair = Pair {
             shapes,
             bodies,
@@ -209,7 +216,8 @@ impl World {
             manifold_pose: Pose::IDENTITY,
             manifold_rotation: Rotation::IDENTITY,
             manifold_middle: Vec3::ZERO,
-            size: self.smaller_radius(shapes),
+            size,
+            touch_distance: size * if cuboids { REUSE_CUBOIDS } else { REUSE_TRANSLATION },
             apart_rotation: self.scaled.speculative_distance / (8.0 * min(reach(0), reach(1))),
             cache: PairCache::default(),
             next: [NONE; 2],
