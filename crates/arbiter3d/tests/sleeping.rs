@@ -56,6 +56,22 @@ fn a_body_sleeps_after_its_time() {
     }
 }
 
+/// The speed of the surface counts, not that of a sphere around the body: a log of 20 m that rolls about its own axis with 0.03 m/s at
+/// its bark sleeps, the same spin end over end (1 m/s at the ends) keeps it awake.
+#[test]
+fn a_long_body_that_rolls_slowly_sleeps() {
+    for (spin, sleeps) in [(Vec3::X * 0.1, true), (Vec3::Y * 0.1, false)] {
+        let mut world = World::new(WorldSettings { gravity: Vec3::ZERO, ..WorldSettings::default() }).unwrap();
+        let log = world.add_body(&BodyDefinition { angular_velocity: spin, ..BodyDefinition::dynamic() }).unwrap();
+        for i in 0..20_u8 {
+            let at = Vec3::new(f32::from(i) - 9.5, 0.0, 0.0);
+            world.add_shape(log, &ShapeDefinition::new(cuboid(0.5, 0.2, 0.2)).at(at)).unwrap();
+        }
+        run(&mut world, 1.0);
+        assert_eq!(awake(&world, log), !sleeps, "spin {spin}");
+    }
+}
+
 /// A moving body does not sleep, however long; one that is slower than the sleep speed does.
 #[test]
 fn speed_keeps_awake() {

@@ -56,6 +56,12 @@ impl Aabb {
         (self.max - self.min) * 0.5
     }
 
+    /// The largest distance of its points from `point` along each axis.
+    #[must_use]
+    pub(crate) fn farthest_from(&self, point: Vec3) -> Vec3 {
+        max3(abs3(self.max - point), abs3(self.min - point))
+    }
+
     /// Surface area: the cost of a box in a tree.
     #[inline(always)]
     #[must_use]

@@ -16,8 +16,9 @@ use super::triangle::{Frame, Group, Reach, Solid};
 use super::triangle_lanes::Near;
 use super::triangle_solid::Solids;
 use super::{Manifold, ManifoldPoint, PairCache};
-use crate::math::{Aabb, Mat3, Pose, Real, Vec3};
-use crate::shape::{MeshSides, OCTET, Shape, TriangleMesh};
+use crate::math::{Aabb, Mat3, Pose, Real, Vec3, abs3};
+use crate::shape::{LEAF, Leaves, MeshSides, Shape, TriangleMesh};
+use crate::simd::{LaneVec3, Lanes};
 
 /// How far behind a one-sided triangle a centre may be and still be pushed out in front, as a share of the scale of
 /// the contact: a body that is halfway through does not flicker.
@@ -72,39 +73,54 @@ impl Contact<'_> {
 
     /// Adds the points of all triangles near the shape. Returns whether one might overlap that gave no point.
     fn touch_all(&self, solid: &mut impl Solid, frame: &Frame, reach: &Reach, out: &mut Candidates) -> bool {
+        let bounds = solid.bounds().expand(self.margin);
         let near = Near {
             frame,
-            aabb: self.aabb,
-            bounds: solid.bounds().expand(self.margin),
+            reach,
+            bounds,
+            size: abs3(bounds.center()).max_element() + bounds.half_extents().max_element(),
             center: frame.position + frame.rotation * solid.center(),
-            far: solid.outer_radius() + self.margin,
             one_sided: self.mesh.sides() == MeshSides::One,
             behind: BEHIND * reach.scale,
         };
-        let mut missing = false;
-        let mut touching = Group::default();
-        let mut sift = |octet: usize, found: u8| {
-            let sides = near.sides(self.mesh.octet(octet));
-            for (k, &side) in sides.iter().enumerate() {
-                let wanted = (found >> k & 1 == 1) & (side != 0.0);
-                if wanted && touching.push((octet * OCTET + k) as u32, side) {
-                    missing |= solid.touch_group(self.mesh, frame, &mut touching, reach, out);
-                }
+        let (mesh, touching) = (self.mesh, Group::default());
+        let mut sieve = Sieve { mesh, near, solid, out, touching, missing: false };
+        mesh.walk(&self.aabb, &mut sieve);
+        let Sieve { solid, out, mut touching, missing, .. } = sieve;
+        let missing = missing | solid.touch_group(mesh, frame, &mut touching, reach, out);
+        missing | solid.finish(mesh, frame, reach, out)
+    }
+}
+
+/// Hands on the triangles that are near a shape.
+struct Sieve<'a, S> {
+    mesh: &'a TriangleMesh,
+    near: Near<'a>,
+    solid: &'a mut S,
+    out: &'a mut Candidates,
+    touching: Group,
+    missing: bool,
+}
+
+impl<S: Solid> Leaves for Sieve<'_, S> {
+    #[inline(always)]
+    fn keep<W: Lanes<LEAF>>(&self, overlapping: W, center: &LaneVec3<W>, half: &LaneVec3<W>) -> W {
+        self.near.keep_boxes(overlapping, center, half)
+    }
+
+    #[inline(always)]
+    fn leaf<W: Lanes<LEAF>>(&mut self, first: usize, count: usize) {
+        let found = self.near.sides(&*self.solid, &self.mesh.corners_of_leaf::<W>(first, count));
+        let mut bits = found.abs().positive() & ((1 << count) - 1);
+        let sides = found.to_array();
+        while bits != 0 {
+            let lane = bits.trailing_zeros() as usize % LEAF;
+            bits &= bits - 1;
+            if self.touching.push((first + lane) as u32, sides[lane]) {
+                self.missing |=
+                    self.solid.touch_group(self.mesh, self.near.frame, &mut self.touching, self.near.reach, self.out);
             }
-        };
-        // The tree gives ascending numbers: those of one octet in a row.
-        let (mut octet, mut found) = (0, 0_u8);
-        self.mesh.for_each_candidate(&self.aabb, |index| {
-            if index / OCTET != octet && found != 0 {
-                sift(octet, std::mem::take(&mut found));
-            }
-            octet = index / OCTET;
-            found |= 1 << (index % OCTET);
-        });
-        if found != 0 {
-            sift(octet, found);
         }
-        missing | solid.touch_group(self.mesh, frame, &mut touching, reach, out)
     }
 }
 
@@ -116,7 +132,7 @@ fn point_in_mesh(mesh: &TriangleMesh, frame: &Frame, candidate: &Candidate) -> M
     if candidate.facet == NO_FACET {
         return ManifoldPoint { point1, normal: turned * (1.0 / turned.length()), separation, feature };
     }
-    let normal: Vec3 = mesh.facet(candidate.facet as usize).normal;
+    let normal: Vec3 = mesh.facet(candidate.facet as usize).normal();
     let normal = if normal.dot(turned) < 0.0 { -normal } else { normal };
     ManifoldPoint { point1, normal, separation, feature }
 }

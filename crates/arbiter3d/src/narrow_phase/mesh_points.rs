@@ -105,16 +105,14 @@ impl Candidates {
         }
         let (touching, limit) = self.touching(&chosen, groups.count);
         for _ in groups.count..4 {
-            let bearing = self.most_useful(&groups, &chosen, touching, limit);
-            let widest = self.most_useful(&groups, &chosen, touching, Real::MAX);
-            let next = match (bearing, widest) {
+            let next = match self.most_useful(&groups, &chosen, touching, limit) {
                 (Some(bearing), Some(widest))
                     if bearing.2 >= BEARING_SHARES[chosen.counts[bearing.0] - 1] * widest.2 =>
                 {
                     Some(bearing)
                 }
                 (_, Some(widest)) => Some(widest),
-                _ => self.most_useful(&groups, &chosen, ALL_GROUPS, Real::MAX),
+                _ => self.most_useful(&groups, &chosen, ALL_GROUPS, Real::MAX).1,
             };
             let Some((group, index, _)) = next else { break };
             chosen.add(group, index);
@@ -147,7 +145,7 @@ impl Candidates {
         }
         let [a, b, c] = [0, 1, 2].map(|k| &self.list[chosen.points[group][k]]);
         let area = groups.normals[group].dot((b.position - a.position).cross(c.position - a.position)).abs();
-        let (_, fourth, gain) = self.most_useful(groups, chosen, 1 << group, Real::MAX)?;
+        let (_, fourth, gain) = self.most_useful(groups, chosen, 1 << group, Real::MAX).1?;
         let fourth = &self.list[fourth];
         if gain < WORTH_WIDENING * area {
             return None;
@@ -231,23 +229,26 @@ impl Candidates {
         best.0
     }
 
-    /// The point up to `limit` that adds most to its group, of the groups in the bit mask: group, index and gain.
-    fn most_useful(&self, groups: &Groups, chosen: &Chosen, mask: u8, limit: Real) -> Option<(usize, usize, Real)> {
-        let mut best = None;
-        let mut most = self.tolerance * self.tolerance;
+    /// The point up to `limit` that adds most to its group, and the one whatever its separation, of the groups in the bit
+    /// mask.
+    fn most_useful(&self, groups: &Groups, chosen: &Chosen, mask: u8, limit: Real) -> (Option<Gain>, Option<Gain>) {
+        let (mut near, mut any) = (None, None);
+        let mut most = [self.tolerance * self.tolerance; 2];
+        let corners = chosen.points.map(|points| points.map(|j| self.list[j].position));
         for (i, candidate) in self.list[..self.count].iter().enumerate() {
             let group = groups.of[i] as usize;
-            if mask >> group & 1 == 0 || candidate.separation > limit {
+            if mask >> group & 1 == 0 {
                 continue;
             }
-            let corners = chosen.points[group].map(|j| self.list[j].position);
-            let gain = gain(&corners[..chosen.counts[group]], candidate.position, groups.normals[group]);
-            if gain > most * TIE {
-                most = gain;
-                best = Some((group, i, gain));
+            let gain = gain(&corners[group][..chosen.counts[group]], candidate.position, groups.normals[group]);
+            if gain > most[0] * TIE && candidate.separation <= limit {
+                (most[0], near) = (gain, Some((group, i, gain)));
+            }
+            if gain > most[1] * TIE {
+                (most[1], any) = (gain, Some((group, i, gain)));
             }
         }
-        best
+        (near, any)
     }
 
     /// Makes room: keeps the deepest point of each group and its extremes along eight directions.
@@ -278,6 +279,9 @@ impl Candidates {
         self.count = count;
     }
 }
+
+/// Group and index of a point, and what it adds.
+type Gain = (usize, usize, Real);
 
 /// The points chosen so far, by group; the first of each is its deepest.
 struct Chosen {

@@ -7,9 +7,10 @@
 //! the face beside it, with the plane's own distance, and never the edge: seams inside a surface are not felt.
 
 use super::mesh_points::{Candidate, Candidates, NO_FACET};
-use super::triangle_lanes::LANES;
+use super::triangle_lanes::Planes;
 use crate::math::{Aabb, Mat3, Real, Vec3, abs3, clamp, max, max3, min, min3};
-use crate::shape::{Capsule, Facet, Sphere, TriangleMesh};
+use crate::shape::{Capsule, Facet, LEAF as LANES, Sphere, Surroundings, TriangleMesh};
+use crate::simd::Lanes;
 
 /// Sine by which a normal may leave the range that an edge or a corner allows: rounding, not geometry.
 const ALLOWED_SINE: Real = 2e-3;
@@ -45,11 +46,13 @@ pub(super) struct Reach {
 pub(super) struct Triangle<'a> {
     pub(super) mesh: &'a TriangleMesh,
     pub(super) frame: &'a Frame,
-    pub(super) facet: &'a Facet,
+    pub(super) around: &'a Surroundings,
     pub(super) index: u32,
     pub(super) corners: [Vec3; 3],
     /// Unit normal on the side of the shape's centre.
     pub(super) normal: Vec3,
+    /// Unit normal on the front.
+    pub(super) front: Vec3,
     /// Of the plane: `normal · x = offset`. Computed in the mesh's axes, where a large triangle's corners are not rounded
     /// by turning them.
     offset: Real,
@@ -63,24 +66,35 @@ impl<'a> Triangle<'a> {
     /// The triangle as seen from its front (`side` 1) or back (−1).
     #[inline]
     pub(super) fn new(mesh: &'a TriangleMesh, frame: &'a Frame, index: u32, side: Real) -> Self {
-        let facet = mesh.facet(index as usize);
-        let corner = |i: usize| frame.inverse * (facet.corners[i] - frame.position);
-        let corners = [corner(0), corner(1), corner(2)];
-        let (low, high) =
-            (min3(corners[0], min3(corners[1], corners[2])), max3(corners[0], max3(corners[1], corners[2])));
-        let front = frame.inverse * facet.normal;
-        let inward = |i: usize| frame.inverse * facet.inward[i];
+        Self::of(mesh, frame, &mesh.facet(index as usize), (index, side))
+    }
+
+    /// As [`Triangle::new`], for those who have its corners at hand.
+    #[inline]
+    pub(super) fn of(mesh: &'a TriangleMesh, frame: &'a Frame, facet: &Facet, (index, side): (u32, Real)) -> Self {
+        let [a, b, c] = facet.corners();
+        let first = a - frame.position;
+        let corners =
+            [frame.inverse * first, frame.inverse * (b - frame.position), frame.inverse * (c - frame.position)];
+        let [a, b, c] = corners;
+        let (low, high) = (min3(a, min3(b, c)), max3(a, max3(b, c)));
+        let front = frame.inverse * facet.normal();
+        let inward = |along: Vec3| {
+            let across = front.cross(along);
+            across * (1.0 / across.length())
+        };
         let extent = max3(abs3(low), abs3(high));
         let size = max(extent.x, max(extent.y, extent.z));
         Self {
             mesh,
             frame,
-            facet,
+            around: mesh.surroundings(index as usize),
             index,
             corners,
             normal: front * side,
-            offset: facet.normal.dot(facet.corners[0] - frame.position) * side,
-            inward: [inward(0), inward(1), inward(2)],
+            front,
+            offset: facet.normal().dot(first) * side,
+            inward: [inward(b - a), inward(c - b), inward(a - c)],
             slack: 1e-3 * frame.scale + 2e-7 * size,
         }
     }
@@ -101,63 +115,70 @@ impl<'a> Triangle<'a> {
     /// was cut is no end of the contact.
     #[inline(always)]
     pub(super) fn is_seam(&self, cut: u32) -> bool {
-        self.facet.flat_edges >> cut & 1 == 1
+        self.around.edge_is_flat(cut as usize)
     }
 
     /// Whether no edge and no corner can touch, only the face.
     #[inline(always)]
     pub(super) fn is_plain(&self) -> bool {
-        self.facet.sharp_edges | self.facet.sharp_corners == 0
+        self.around.is_plain()
     }
 
     #[inline(always)]
     pub(super) fn edge_is_sharp(&self, i: usize) -> bool {
-        self.facet.sharp_edges >> i & 1 == 1
+        self.around.edge_is_sharp(i)
     }
 
     /// Whether the surface has a summit along `normal` at edge `i`, for a normal at a right angle to the edge.
     pub(super) fn edge_allows(&self, i: usize, normal: Vec3) -> bool {
-        let across = self.frame.inverse * self.mesh.neighborhood(self.index as usize).inward[i];
         self.edge_is_sharp(i)
             && self.inward[i].dot(normal) <= ALLOWED_SINE
-            && across.dot(normal) <= ALLOWED_SINE
             && self.normal.dot(normal) >= -ALLOWED_SINE
+            && self.around.bend(i).across(self.front, self.inward[i]).dot(normal) <= ALLOWED_SINE
     }
 
     /// Whether the surface has a summit along `normal` at corner `i`.
     pub(super) fn corner_allows(&self, i: usize, normal: Vec3) -> bool {
-        if self.facet.sharp_corners >> i & 1 == 0 || self.normal.dot(normal) < -ALLOWED_SINE {
+        if !self.around.corner_is_sharp(i) || self.normal.dot(normal) < -ALLOWED_SINE {
+            return false;
+        }
+        let falls = |along: Vec3| along.dot(normal) <= ALLOWED_SINE * along.length();
+        // Its own edges tell most of those that are not allowed.
+        if !falls(self.corners[(i + 1) % 3] - self.corners[i]) || !falls(self.corners[(i + 2) % 3] - self.corners[i]) {
             return false;
         }
         let normal = self.frame.rotation * normal;
-        let corner = self.facet.corners[i];
-        let mut ends = self.mesh.corner_ends(self.mesh.neighborhood(self.index as usize).corners[i]);
-        ends.all(|(end, _)| {
+        let corner = self.mesh.corners(self.index as usize)[i];
+        let mut allowed = true;
+        self.mesh.each_end(corner, |end| {
             let along = end - corner;
-            along.dot(normal) <= ALLOWED_SINE * along.length()
-        })
+            allowed = along.dot(normal) <= ALLOWED_SINE * along.length();
+            allowed
+        });
+        allowed
     }
 
     /// Whether the surface goes on from corner `i` by `distance` along `normal` before it has fallen by `fall` under the
     /// plane of this triangle: steepest climb from corner to corner.
     pub(super) fn goes_on(&self, i: usize, normal: Vec3, distance: Real, fall: Real) -> bool {
         let (along, up) = (self.frame.rotation * normal, self.frame.rotation * self.normal);
-        let start = self.facet.corners[i];
-        let mut corner = self.mesh.neighborhood(self.index as usize).corners[i];
+        let start = self.mesh.corners(self.index as usize)[i];
+        let mut corner = start;
         let mut reached = 0.0;
         for _ in 0..MOST_CLIMBS {
             let mut next = None;
-            for (end, number) in self.mesh.corner_ends(corner) {
+            self.mesh.each_end(corner, |end| {
                 let step = end - start;
                 if step.dot(along) > reached && step.dot(up) >= -fall {
-                    (reached, next) = (step.dot(along), Some(number));
+                    (reached, next) = (step.dot(along), Some(end));
                 }
-            }
-            let Some(number) = next else { return false };
+                true
+            });
+            let Some(end) = next else { return false };
             if reached >= distance {
                 return true;
             }
-            corner = number;
+            corner = end;
         }
         // So finely cut that it went on for hundreds of edges: it is no rim.
         true
@@ -195,14 +216,14 @@ impl<'a> Triangle<'a> {
             position: above - self.normal * height,
             normal: self.normal,
             separation: height - radius,
-            feature: feature_id(self.facet.patch, feature),
+            feature: feature_id(self.around.patch, feature),
             facet: self.index,
         }
     }
 
     /// A point on an edge or a corner.
     pub(super) fn rim_candidate(&self, position: Vec3, normal: Vec3, separation: Real, feature: u32) -> Candidate {
-        let feature = feature_id(self.facet.id, feature);
+        let feature = feature_id(self.around.id, feature);
         Candidate { position, normal, separation, feature, facet: NO_FACET }
     }
 }
@@ -240,12 +261,6 @@ impl Group {
         }
         any
     }
-
-    /// The triangles; places left over hold triangles of any kind.
-    #[inline(always)]
-    pub(super) fn facets<'a>(&self, mesh: &'a TriangleMesh) -> [&'a Facet; LANES] {
-        std::array::from_fn(|k| mesh.facet(self.indices[k] as usize))
-    }
 }
 
 /// A convex shape that can be held against triangles one by one.
@@ -254,12 +269,13 @@ pub(super) trait Solid {
     fn center(&self) -> Vec3;
     /// Radius of a ball about the centre inside the shape.
     fn inner_radius(&self) -> Real;
-    /// Radius of a ball about the centre around the shape.
-    fn outer_radius(&self) -> Real;
     /// The box around the shape in its frame.
     fn bounds(&self) -> Aabb;
-    /// Adds the points of the triangles of a group, which is empty after it. Returns whether one might overlap the shape
-    /// but gave no point, because it is the neighbours' matter: if they give none either, it is looked at again.
+    /// Zero where a triangle is farther than the margin, as far as can be told at a small cost.
+    fn keep_reached<W: Lanes<LANES>>(&self, sides: W, planes: &Planes<W>, margin: Real) -> W;
+    /// Adds the points of the triangles of a group, which is empty after it, or keeps some for [`Solid::finish`]. Returns
+    /// whether one might overlap the shape but gave no point, because it is the neighbours' matter: if they give none
+    /// either, it is looked at again.
     fn touch_group(
         &mut self,
         mesh: &TriangleMesh,
@@ -268,6 +284,10 @@ pub(super) trait Solid {
         reach: &Reach,
         out: &mut Candidates,
     ) -> bool;
+    /// Adds the points of triangles that were kept; returns as [`Solid::touch_group`].
+    fn finish(&mut self, _mesh: &TriangleMesh, _frame: &Frame, _reach: &Reach, _out: &mut Candidates) -> bool {
+        false
+    }
 }
 
 impl Solid for Sphere {
@@ -279,12 +299,13 @@ impl Solid for Sphere {
         self.radius()
     }
 
-    fn outer_radius(&self) -> Real {
-        self.radius()
-    }
-
     fn bounds(&self) -> Aabb {
         self.local_aabb()
+    }
+
+    #[inline(always)]
+    fn keep_reached<W: Lanes<LANES>>(&self, sides: W, planes: &Planes<W>, _margin: Real) -> W {
+        planes.keep_low(sides, &[Vec3::ZERO], self.radius())
     }
 
     fn touch_group(
@@ -361,12 +382,14 @@ impl Solid for Capsule {
         self.radius()
     }
 
-    fn outer_radius(&self) -> Real {
-        self.radius() + self.half_length()
-    }
-
     fn bounds(&self) -> Aabb {
         self.local_aabb()
+    }
+
+    #[inline(always)]
+    fn keep_reached<W: Lanes<LANES>>(&self, sides: W, planes: &Planes<W>, _margin: Real) -> W {
+        let end = Vec3::new(0.0, self.half_length(), 0.0);
+        planes.keep_low(sides, &[-end, end], self.radius())
     }
 
     fn touch_group(
@@ -401,7 +424,7 @@ fn touch_capsule(capsule: &Capsule, triangle: &Triangle, reach: &Reach, out: &mu
                 && heights[k] - capsule.radius() <= reach.margin
                 && (reach.second_look || !triangle.is_seam(cuts[k]))
             {
-                let cut = 2 + (triangle.facet.id << 3 | cuts[k] << 1 | k as u32);
+                let cut = 2 + (triangle.around.id << 3 | cuts[k] << 1 | k as u32);
                 let feature = if cuts[k] == 3 { k as u32 } else { cut };
                 let point = end * (2.0 * ends[k] - 1.0);
                 out.push(triangle.face_candidate(point, heights[k], capsule.radius(), feature));
@@ -410,7 +433,7 @@ fn touch_capsule(capsule: &Capsule, triangle: &Triangle, reach: &Reach, out: &mu
         }
     }
     for i in 0..3 {
-        if triangle.facet.sharp_edges >> i & 1 == 1 || triangle.facet.sharp_corners >> i & 1 == 1 {
+        if triangle.edge_is_sharp(i) || triangle.around.corner_is_sharp(i) {
             missing &= !capsule.touch_edge(triangle, i, reach, out);
         }
     }

@@ -1,22 +1,18 @@
 //! Eight triangles of a mesh at once against a convex shape: which are near, and where a solid overlaps them least.
 //!
-//! Of the triangles that the mesh's tree finds around a body a third lie near its surface, and of these again a fourth
-//! touch. Both are told by arithmetic without branches, so it is done in lanes: [`Sift`] drops triangles outside the box
-//! around the shape in its own frame or seen from behind, [`LeastOverlap`] tries all separating axes of a solid (see
-//! `triangle_solid`) and drops those with a gap beyond the margin. What is left is held against the shape one by one.
+//! All is told by arithmetic without branches, so it is done in lanes, and after each stage what is left is packed anew.
+//! [`Near`] drops boxes of the tree beside the shape's own box, then triangles outside that box, wholly below it or seen
+//! from behind. [`FaceSearch`] tries the faces of triangle and solid as separating axes and drops those with a gap beyond
+//! the margin, [`EdgeSearch`] the pairs of edges (see `triangle_solid`). What is left is held against the shape one by one.
 //!
 //! Lanes never mix and go through the operations of one triangle alone in the same order, so that a triangle's result does
 //! not depend on its neighbours in the group nor on the instructions that the machine has.
 
 use super::polyhedron::Polyhedron;
-use super::triangle::Frame;
-use crate::math::{Aabb, Mat3, Real, Vec3};
-use crate::shape::{Facet, OCTET, Octet};
+use super::triangle::{Frame, Reach, Solid};
+use crate::math::{Aabb, Mat3, Real, Vec3, abs3};
+use crate::shape::{Facet, LEAF as LANES};
 use crate::simd::{KernelOfEight, LaneVec3, Lanes, Number, run_eight};
-use std::array::from_fn;
-
-/// Triangles in a group.
-pub(super) const LANES: usize = OCTET;
 
 /// Axes that push through the triangle to its other side are no way out; those that lean back less tell at least that
 /// the contact is a neighbour's.
@@ -25,14 +21,13 @@ pub(super) const BACKWARD: Real = -0.7;
 /// What a triangle has to be near to.
 pub(super) struct Near<'a> {
     pub(super) frame: &'a Frame,
-    /// The box around the shape, margin included, in the frame of the mesh.
-    pub(super) aabb: Aabb,
-    /// The same in the frame of the shape.
+    pub(super) reach: &'a Reach,
+    /// The box around the shape, margin included, in the frame of the shape.
     pub(super) bounds: Aabb,
+    /// How large that box is: what rounding is relative to.
+    pub(super) size: Real,
     /// A point inside the shape, in the frame of the mesh.
     pub(super) center: Vec3,
-    /// Planes farther from that point than this are out of reach.
-    pub(super) far: Real,
     /// Triangles seen from behind are left out.
     pub(super) one_sided: bool,
     /// But for those that the centre is behind by no more than this.
@@ -40,36 +35,71 @@ pub(super) struct Near<'a> {
 }
 
 impl Near<'_> {
-    /// For each triangle on which side of it the shape is (1 in front, −1 behind), 0 if it is out of reach.
-    pub(super) fn sides(&self, octet: &Octet) -> [Real; LANES] {
-        let mut sides = [0.0; LANES];
-        run_eight(Sift { near: self, octet, sides: &mut sides });
-        sides
-    }
-}
+    /// Rounding, as a share of the numbers compared.
+    const SLACK: Real = 1e-5;
 
-struct Sift<'a> {
-    near: &'a Near<'a>,
-    octet: &'a Octet,
-    sides: &'a mut [Real; LANES],
-}
-
-impl KernelOfEight for Sift<'_> {
+    /// Zero where a box in the frame of the mesh does not overlap the bounds.
     #[inline(always)]
-    fn run<W: Lanes<LANES>>(self) {
-        let near = self.near;
-        let [a, b, c] = &self.octet.corners;
-        let corners: [LaneVec3<W>; 3] = [a.to_lanes(), b.to_lanes(), c.to_lanes()];
-        let normal: LaneVec3<W> = self.octet.normal.to_lanes();
-        let height = normal.dot(&(LaneVec3::splat(near.center) - corners[0]));
-        let (behind, other) = if near.one_sided { (-near.behind, 0.0) } else { (0.0, -1.0) };
-        let sides = height.if_at_least(W::splat(behind), W::splat(1.0), W::splat(other));
-        let sides = W::splat(near.far).if_at_least(height.abs(), sides, W::ZERO);
-        let sides = keep_overlapping(sides, &corners, &near.aabb);
-        let position = LaneVec3::splat(near.frame.position);
-        let local = turn_corners(&near.frame.inverse, &from_position(&corners, &position));
-        *self.sides = keep_overlapping(sides, &local, &near.bounds).to_array();
+    pub(super) fn keep_boxes<W: Number>(&self, found: W, center: &LaneVec3<W>, half: &LaneVec3<W>) -> W {
+        let m = &self.frame.inverse;
+        let absolute = Mat3::from_cols(abs3(m.x_axis), abs3(m.y_axis), abs3(m.z_axis));
+        let from = turn(m, &(*center - LaneVec3::splat(self.frame.position)));
+        let size = turn(&absolute, half);
+        let (middle, reach) = (self.bounds.center(), self.bounds.half_extents());
+        let found = keep_reached(found, from.x, size.x, [middle.x, reach.x]);
+        let found = keep_reached(found, from.y, size.y, [middle.y, reach.y]);
+        keep_reached(found, from.z, size.z, [middle.z, reach.z])
     }
+
+    /// For each triangle on which side of it the shape is (1 in front, −1 behind), 0 if it is out of reach.
+    #[inline(always)]
+    pub(super) fn sides<W: Lanes<LANES>>(&self, solid: &impl Solid, corners: &[LaneVec3<W>; 3]) -> W {
+        let [a, b, c] = from_position(corners, &LaneVec3::splat(self.frame.position));
+        let normal = (b - a).cross(&(c - a));
+        let length = normal.dot(&normal).sqrt();
+        let height = normal.dot(&(LaneVec3::splat(self.center - self.frame.position) - a));
+        let (behind, other) = if self.one_sided { (-self.behind, 0.0) } else { (0.0, -1.0) };
+        let sides = height.if_at_least(W::splat(behind) * length, W::splat(1.0), W::splat(other));
+        let local = turn_corners(&self.frame.inverse, &[a, b, c]);
+        let sides = keep_overlapping(sides, &local, &self.bounds);
+        if sides.abs().positive() == 0 {
+            return sides;
+        }
+        let normal = turn(&self.frame.inverse, &normal);
+        let reached = self.reach.margin + Self::SLACK * self.size;
+        let planes = Planes { corners: local, normal: normal.scale(sides), gap: W::splat(reached) * length, length };
+        solid.keep_reached(sides, &planes, self.reach.margin)
+    }
+}
+
+/// Triangles in the frame of the shape, and their planes.
+pub(super) struct Planes<W> {
+    pub(super) corners: [LaneVec3<W>; 3],
+    /// Towards the side of the shape, as long as twice the triangle's area.
+    normal: LaneVec3<W>,
+    length: W,
+    /// The most that the lowest point may be above the plane, times that length.
+    gap: W,
+}
+
+impl<W: Number> Planes<W> {
+    /// Zero where the lowest of some points, grown by a radius, is too far above the plane.
+    #[inline(always)]
+    pub(super) fn keep_low(&self, sides: W, points: &[Vec3], radius: Real) -> W {
+        let mut lowest = W::splat(Real::MAX);
+        for &point in points {
+            lowest = LaneVec3::splat(point).dot(&self.normal).min(lowest);
+        }
+        let height = lowest - self.normal.dot(&self.corners[0]) - W::splat(radius) * self.length;
+        self.gap.if_at_least(height, sides, W::ZERO)
+    }
+}
+
+/// Zero where an interval, by its centre and half its length, does not overlap another.
+#[inline(always)]
+fn keep_reached<W: Number>(found: W, center: W, half: W, [middle, reach]: [Real; 2]) -> W {
+    let slack = W::splat(Near::SLACK) * (center.abs() + half);
+    (half + W::splat(reach) + slack).if_at_least((center - W::splat(middle)).abs(), found, W::ZERO)
 }
 
 /// Zero where the box around the corners does not overlap the given one.
@@ -90,10 +120,12 @@ fn keep_between<W: Number>(sides: W, [a, b, c]: [W; 3], low: Real, high: Real) -
 }
 
 /// The axis of least overlap of a solid with each of some triangles.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Overlaps {
     /// Of the solid's lowest corner over the triangle's plane.
     pub(super) height: [Real; LANES],
+    /// That corner.
+    pub(super) corner: [Real; LANES],
     /// Along the axis of least overlap.
     pub(super) separation: [Real; LANES],
     /// 0 for the triangle's face; then the solid's faces; then its edges (one half of each) with the triangle's first,
@@ -102,76 +134,141 @@ pub(super) struct Overlaps {
     /// 1 where the solid's lowest corner is within the margin of the triangle's plane and no axis that was tried shows a
     /// gap beyond it, else 0.
     pub(super) near: [Real; LANES],
+    /// 1 where pairs of edges are to be tried, else 0.
+    pub(super) open: [Real; LANES],
 }
 
-/// Tries all axes; see [`Overlaps`].
-pub(super) struct LeastOverlap<'a> {
+impl Overlaps {
+    /// Takes what was found of one triangle over into another lane.
+    #[inline(always)]
+    pub(super) fn take(&mut self, lane: usize, other: &Self, from: usize) {
+        self.height[lane] = other.height[from];
+        self.corner[lane] = other.corner[from];
+        self.separation[lane] = other.separation[from];
+        self.axis[lane] = other.axis[from];
+        self.near[lane] = other.near[from];
+        self.open[lane] = other.open[from];
+    }
+}
+
+/// What axes are tried against, and by which measure.
+#[derive(Clone, Copy)]
+pub(super) struct Search<'a> {
     pub(super) solid: &'a Polyhedron<'a>,
     pub(super) frame: &'a Frame,
-    pub(super) facets: [&'a Facet; LANES],
+    pub(super) facets: &'a [Facet; LANES],
     /// 1 or −1: from which side the solid comes.
     pub(super) sides: [Real; LANES],
     /// Gaps up to this give points.
     pub(super) margin: Real,
     /// An axis must be better than the triangle's face by this.
     pub(super) bias: Real,
+}
+
+/// Tries the faces of triangles and solid.
+pub(super) struct FaceSearch<'a> {
+    pub(super) search: Search<'a>,
+    /// 1 in lanes that hold a triangle, else 0.
+    pub(super) wanted: [Real; LANES],
+    /// 1 for triangles with sharp edges or corners, else 0.
+    pub(super) sharp: [Real; LANES],
     /// Over a triangle without sharp edges the face alone counts, up to this depth: other axes are not tried.
     pub(super) shallow: Real,
 }
 
-impl LeastOverlap<'_> {
+impl FaceSearch<'_> {
     pub(super) fn find(self) -> Overlaps {
-        const NONE: [Real; LANES] = [0.0; LANES];
-        let mut found = Overlaps { height: NONE, separation: NONE, axis: NONE, near: NONE };
-        run_eight(Search { input: self, found: &mut found });
+        let mut found = Overlaps::default();
+        run_eight(OfFaces { input: self, found: &mut found });
         found
     }
 }
 
-struct Search<'a, 'b> {
-    input: LeastOverlap<'a>,
+struct OfFaces<'a, 'b> {
+    input: FaceSearch<'a>,
     found: &'b mut Overlaps,
 }
 
-impl KernelOfEight for Search<'_, '_> {
+impl KernelOfEight for OfFaces<'_, '_> {
     #[inline(always)]
     fn run<W: Lanes<LANES>>(self) {
-        let LeastOverlap { solid, frame, facets, sides, margin, bias, shallow } = self.input;
-        let unturned = from_position(&gather_corners::<W>(&facets), &LaneVec3::splat(frame.position));
-        let front: LaneVec3<W> = gather(&facets, |facet| facet.normal);
-        let sides = W::from_array(sides);
-        let normal = turn(&frame.inverse, &front).scale(sides);
+        let FaceSearch { search, wanted, sharp, shallow } = self.input;
+        let (unturned, front) = gather::<W>(search.facets, search.frame);
+        let sides = W::from_array(search.sides);
+        let normal = turn(&search.frame.inverse, &front).scale(sides);
         let offset = front.dot(&unturned[0]) * sides;
-        let mut lowest = W::splat(Real::MAX);
-        for &vertex in solid.vertices {
-            lowest = LaneVec3::splat(vertex).dot(&normal).min(lowest);
+        let (mut lowest, mut corner) = (W::splat(Real::MAX), W::ZERO);
+        for (index, &vertex) in search.solid.vertices.iter().enumerate() {
+            let height = LaneVec3::splat(vertex).dot(&normal);
+            corner = lowest.if_above(height, W::splat(index as Real), corner);
+            lowest = height.min(lowest);
         }
         let height = lowest - offset;
-        let low = W::splat(margin).if_at_least(height, W::splat(1.0), W::ZERO);
-        let has_sharp = |facet: &Facet| if facet.sharp_edges | facet.sharp_corners == 0 { 0.0 } else { 1.0 };
-        let sharp = W::from_array(from_fn(|k| has_sharp(facets[k])));
-        let tried = low * height.if_at_least(W::splat(-shallow), sharp, W::splat(1.0));
-        let mut best = Best { axis: W::ZERO, separation: height, near: tried, margin, bias };
-        if best.any_near::<LANES>() {
-            let corners = turn_corners(&frame.inverse, &unturned);
-            best.try_faces(solid, &corners, &normal);
-            for edge in 0..3 {
-                if best.any_near::<LANES>() {
-                    let inward = turn(&frame.inverse, &gather(&facets, |facet| facet.inward[edge]));
-                    let along = corners[(edge + 1) % 3] - corners[edge];
-                    best.try_edges::<LANES>(solid, edge, &TriangleEdge { start: corners[edge], along, inward, normal });
-                }
-            }
+        let low = W::splat(search.margin).if_at_least(height, W::from_array(wanted), W::ZERO);
+        let tried = low * height.if_at_least(W::splat(-shallow), W::from_array(sharp), W::splat(1.0));
+        let mut best =
+            Best { axis: W::ZERO, separation: height, near: tried, margin: search.margin, bias: search.bias };
+        if best.near.positive() != 0 {
+            best.try_faces(search.solid, &turn_corners(&search.frame.inverse, &unturned), &normal);
         }
-        let near = low - tried + best.near;
         *self.found = Overlaps {
             height: height.to_array(),
+            corner: corner.to_array(),
             separation: best.separation.to_array(),
             axis: best.axis.to_array(),
-            near: near.to_array(),
+            near: (low - tried + best.near).to_array(),
+            open: best.near.to_array(),
         };
     }
 }
+
+/// Tries the pairs of edges of the solid with those of the triangles for which they are open.
+pub(super) struct EdgeSearch<'a> {
+    pub(super) search: Search<'a>,
+    pub(super) found: &'a mut Overlaps,
+}
+
+impl EdgeSearch<'_> {
+    pub(super) fn find(self) {
+        run_eight(self);
+    }
+}
+
+impl KernelOfEight for EdgeSearch<'_> {
+    #[inline(always)]
+    fn run<W: Lanes<LANES>>(self) {
+        let Search { solid, frame, facets, sides, margin, bias } = self.search;
+        let (unturned, front) = gather::<W>(facets, frame);
+        let corners = turn_corners(&frame.inverse, &unturned);
+        let front = turn(&frame.inverse, &front);
+        let normal = front.scale(W::from_array(sides));
+        let open = W::from_array(self.found.open);
+        let mut best = Best {
+            axis: W::from_array(self.found.axis),
+            separation: W::from_array(self.found.separation),
+            near: open,
+            margin,
+            bias,
+        };
+        let mut slopes = [W::ZERO; MOST_SLOPES];
+        for edge in 0..3 {
+            if best.near.positive() == 0 {
+                break;
+            }
+            let along = corners[(edge + 1) % 3] - corners[edge];
+            let inward = front.cross(&along);
+            let edges = TriangleEdge { start: corners[edge], along, inward, normal };
+            best.try_edges::<LANES>(solid, edge, &edges, &mut slopes);
+        }
+        let near = W::from_array(self.found.near) - open + best.near;
+        self.found.separation = best.separation.to_array();
+        self.found.axis = best.axis.to_array();
+        self.found.near = near.to_array();
+    }
+}
+
+/// Faces of a solid whose slopes along an edge are worked out once for all of their edges.
+const MOST_SLOPES: usize = 32;
 
 /// The same edge of each triangle.
 struct TriangleEdge<W> {
@@ -192,14 +289,6 @@ struct Best<W> {
 }
 
 impl<W: Number> Best<W> {
-    #[inline(always)]
-    fn any_near<const L: usize>(&self) -> bool
-    where
-        W: Lanes<L>,
-    {
-        self.near.to_array().iter().fold(false, |any, near| any | (*near > 0.0))
-    }
-
     /// Takes an axis where it is better, and drops triangles with a gap along it. An axis that is none has a separation of
     /// `-Real::MAX`.
     #[inline(always)]
@@ -225,46 +314,69 @@ impl<W: Number> Best<W> {
     }
 
     #[inline(always)]
-    fn try_edges<const L: usize>(&mut self, solid: &Polyhedron, edge: usize, of: &TriangleEdge<W>)
-    where
+    fn try_edges<const L: usize>(
+        &mut self,
+        solid: &Polyhedron,
+        edge: usize,
+        of: &TriangleEdge<W>,
+        slopes: &mut [W; MOST_SLOPES],
+    ) where
         W: Lanes<L>,
     {
         let pairs = solid.edges.as_chunks::<2>().0;
         let first = 1 + solid.planes.len() + edge * pairs.len();
         let shortest = W::splat(1e-12) * of.along.dot(&of.along);
+        let known = solid.planes.len() <= MOST_SLOPES;
+        for (plane, slope) in solid.planes.iter().zip(slopes.iter_mut()) {
+            *slope = LaneVec3::splat(plane.normal).dot(&of.along);
+        }
         for (index, twins) in pairs.iter().enumerate() {
-            let a = LaneVec3::splat(solid.planes[twins[0].face as usize].normal);
-            let b = LaneVec3::splat(solid.planes[twins[1].face as usize].normal);
-            let (da, db) = (a.dot(&of.along), b.dot(&of.along));
-            let across = da * db;
-            if across.to_array().iter().fold(true, |all, product| all & (*product >= 0.0)) {
+            let faces = [twins[0].face as usize, twins[1].face as usize];
+            let (da, db) = if known {
+                (slopes[faces[0] % MOST_SLOPES], slopes[faces[1] % MOST_SLOPES])
+            } else {
+                let [a, b] = [solid.planes[faces[0]].normal, solid.planes[faces[1]].normal];
+                (LaneVec3::splat(a).dot(&of.along), LaneVec3::splat(b).dot(&of.along))
+            };
+            // Positive where the arc between the two faces crosses the plane square to the edge, in lanes that still count.
+            let crosses = (da * db).if_at_least(W::ZERO, W::ZERO, self.near);
+            if crosses.positive() == 0 {
                 continue;
             }
+            let (a, b) =
+                (LaneVec3::splat(solid.planes[faces[0]].normal), LaneVec3::splat(solid.planes[faces[1]].normal));
             let outward = a.scale(db.abs()) + b.scale(da.abs());
+            let valid = outward.dot(&of.inward).if_above(W::ZERO, crosses, W::ZERO);
+            if valid.positive() == 0 {
+                continue;
+            }
             let squared = outward.dot(&outward);
+            let valid = squared.if_at_least(shortest, valid, W::ZERO);
             let axis = outward.scale(W::splat(-1.0) / squared.sqrt());
             let separation = axis.dot(&(LaneVec3::splat(solid.vertices[twins[0].origin as usize]) - of.start));
-            let none = W::splat(-Real::MAX);
-            let separation = across.if_at_least(W::ZERO, none, separation);
-            let separation = outward.dot(&of.inward).if_above(W::ZERO, separation, none);
-            let separation = squared.if_at_least(shortest, separation, none);
-            self.offer((first + index) as Real, axis.dot(&of.normal), separation);
+            let separation = valid.if_positive(separation, W::splat(-Real::MAX));
+            // Neither a gap nor better than what is known, in any lane: most are not.
+            let useful = (self.separation + W::splat(self.bias)).min(W::splat(self.margin));
+            if separation.if_above(useful, W::splat(1.0), W::ZERO).positive() != 0 {
+                self.offer((first + index) as Real, axis.dot(&of.normal), separation);
+            }
         }
     }
 }
 
+/// Corners as seen from the position of the solid, and normals.
 #[inline(always)]
-fn gather<W: Lanes<LANES>>(facets: &[&Facet; LANES], pick: impl Fn(&Facet) -> Vec3) -> LaneVec3<W> {
-    LaneVec3 {
-        x: W::from_array(from_fn(|k| pick(facets[k]).x)),
-        y: W::from_array(from_fn(|k| pick(facets[k]).y)),
-        z: W::from_array(from_fn(|k| pick(facets[k]).z)),
+fn gather<W: Lanes<LANES>>(facets: &[Facet; LANES], frame: &Frame) -> ([LaneVec3<W>; 3], LaneVec3<W>) {
+    let mut records = [&facets[0].quads; LANES];
+    for (record, facet) in records.iter_mut().zip(facets) {
+        *record = &facet.quads;
     }
-}
-
-#[inline(always)]
-fn gather_corners<W: Lanes<LANES>>(facets: &[&Facet; LANES]) -> [LaneVec3<W>; 3] {
-    [gather(facets, |f| f.corners[0]), gather(facets, |f| f.corners[1]), gather(facets, |f| f.corners[2])]
+    let [ax, ay, az, bx] = W::load_quad(&records, 0);
+    let [by, bz, cx, cy] = W::load_quad(&records, 1);
+    let [cz, x, y, z] = W::load_quad(&records, 2);
+    let corners =
+        [LaneVec3 { x: ax, y: ay, z: az }, LaneVec3 { x: bx, y: by, z: bz }, LaneVec3 { x: cx, y: cy, z: cz }];
+    (from_position(&corners, &LaneVec3::splat(frame.position)), LaneVec3 { x, y, z })
 }
 
 #[inline(always)]

@@ -4,8 +4,9 @@ use super::*;
 use crate::math::{Aabb, Pose, Rotation};
 use crate::narrow_phase::polyhedron::CuboidFeatures;
 use crate::narrow_phase::tests::Random;
-use crate::narrow_phase::triangle_lanes::{LANES, Near};
-use crate::shape::{ConvexHull, Cuboid};
+use crate::narrow_phase::triangle_lanes::Near;
+use crate::shape::{ConvexHull, Cuboid, Leaves};
+use crate::simd::{LaneVec3, Lanes, Wide};
 
 /// A rough surface: every edge is a ridge or a groove.
 fn rough(random: &mut Random) -> TriangleMesh {
@@ -25,21 +26,17 @@ fn frame_of(pose: &Pose) -> Frame {
 
 /// Eight triangles against the solid, at once and one by one.
 fn compare(solid: &Polyhedron, mesh: &TriangleMesh, frame: &Frame, indices: [u32; LANES], reach: &Reach) -> [usize; 3] {
-    let group = Group { indices, sides: [1.0; LANES], count: LANES };
-    let found = LeastOverlap {
-        solid,
-        frame,
-        facets: group.facets(mesh),
-        sides: group.sides,
-        margin: reach.margin,
-        bias: BIAS * reach.scale,
-        shallow: -Real::MAX,
-    }
-    .find();
+    let facets = indices.map(|index| mesh.facet(index as usize));
+    let search =
+        Search { solid, frame, facets: &facets, sides: [1.0; LANES], margin: reach.margin, bias: BIAS * reach.scale };
+    let (wanted, sharp) = ([1.0; LANES], [1.0; LANES]);
+    let mut found = FaceSearch { search, wanted, sharp, shallow: -Real::MAX }.find();
+    EdgeSearch { search, found: &mut found }.find();
     let mut counts = [0; 3];
     for (k, &index) in indices.iter().enumerate() {
         let triangle = Triangle::new(mesh, frame, index, 1.0);
-        let underside = Underside::new(solid, triangle.normal);
+        let mut underside = Underside::NONE;
+        underside.turn_to(solid, triangle.normal, found.corner[k] as usize);
         let height = triangle.height(solid.vertices[underside.corner]);
         assert_eq!(height.to_bits(), found.height[k].to_bits());
         let pair = Pair { solid, triangle: &triangle, reach, underside: &underside, height };
@@ -75,7 +72,7 @@ fn eight_triangles_at_once_give_the_axes_of_each_alone() {
         let reach = Reach { margin: 0.02, scale: 0.02, second_look: false };
         let around = Aabb::from_center(pose.position, Vec3::splat(0.7));
         let mut near = Vec::new();
-        mesh.for_each_candidate(&around, |index| near.push(index as u32));
+        mesh.for_each_facet(&around, |index| near.push(index as u32));
         for start in 0..near.len() {
             // Neighbours of all kinds, so that a lane that minded them would show.
             let pick =
@@ -98,41 +95,78 @@ fn sifting_keeps_what_overlaps_both_boxes_on_the_right_side() {
         let frame = frame_of(&pose);
         let bounds = Aabb::from_center(Vec3::ZERO, Vec3::new(0.5, 0.2, 0.3));
         let one_sided = round % 2 == 0;
-        let near = Near {
-            frame: &frame,
-            aabb: bounds.transform(&pose),
-            bounds,
-            center: pose.position,
-            far: 0.62,
-            one_sided,
-            behind: 0.002,
-        };
-        for octet in 0..count.div_ceil(LANES) {
-            let sides = near.sides(mesh.octet(octet));
-            for (index, side) in (LANES * octet..count).zip(sides) {
-                let facet = mesh.facet(index);
-                let height = facet.normal.dot(pose.position - facet.corners[0]);
-                let local = facet.corners.map(|corner| frame.inverse * (corner - frame.position));
-                let near_by = Aabb::from_points(facet.corners).overlaps(&near.aabb)
-                    && Aabb::from_points(local).overlaps(&near.bounds)
-                    && height.abs() <= near.far;
-                let expected = match (near_by, one_sided) {
-                    (false, _) => 0.0,
-                    (true, true) if height >= -near.behind => 1.0,
-                    (true, true) => 0.0,
-                    (true, false) => {
-                        if height >= 0.0 {
-                            1.0
-                        } else {
-                            -1.0
-                        }
-                    }
-                };
-                assert_eq!(side, expected, "triangle {index}, height {height}");
+        let cuboid = CuboidFeatures::new(&Cuboid::new(Vec3::new(0.49, 0.19, 0.29)).unwrap());
+        let solid = Solids::new(cuboid.view());
+        let reach = Reach { margin: 0.01, scale: 0.01, second_look: false };
+        let near =
+            Near { frame: &frame, reach: &reach, bounds, size: 0.5, center: pose.position, one_sided, behind: 0.002 };
+        for first in (0..count).step_by(LANES) {
+            let leaf = LANES.min(count - first);
+            let sides = near.sides(&solid, &mesh.corners_of_leaf::<Wide<LANES>>(first, leaf)).to_array();
+            for (index, side) in (first..first + leaf).zip(sides) {
+                let (corners, normal) = (mesh.corners(index), mesh.facet(index).normal());
+                let height = normal.dot(pose.position - corners[0]);
+                let turned = frame.inverse * normal;
+                let reach = turned.abs().dot(Vec3::new(0.49, 0.19, 0.29)) + 0.01;
+                let local = corners.map(|corner| frame.inverse * (corner - frame.position));
+                let near_by = Aabb::from_points(local).overlaps(&near.bounds);
+                let front = height >= if one_sided { -near.behind } else { 0.0 };
+                let back = if one_sided { 0.0 } else { -1.0 };
+                let expected = if front { 1.0 } else { back };
+                if !near_by || height * expected > 1.0001 * reach {
+                    assert_eq!(side, 0.0, "triangle {index}, height {height}");
+                } else if height * expected < 0.9999 * reach && (height + near.behind).abs().min(height.abs()) > 1e-6 {
+                    assert_eq!(side, expected, "triangle {index}, height {height}");
+                }
                 kept += usize::from(side > 0.0);
                 behind += usize::from(side < 0.0);
             }
         }
     }
     assert!(kept > 1000 && behind > 500, "{kept} {behind}");
+}
+
+/// Collects triangles, or those alone whose leaf a shape's own box reaches.
+struct Collect<'a> {
+    near: Option<&'a Near<'a>>,
+    found: Vec<usize>,
+}
+
+impl Leaves for Collect<'_> {
+    fn keep<W: Lanes<LANES>>(&self, overlapping: W, center: &LaneVec3<W>, half: &LaneVec3<W>) -> W {
+        self.near.map_or(overlapping, |near| near.keep_boxes(overlapping, center, half))
+    }
+
+    fn leaf<W: Lanes<LANES>>(&mut self, first: usize, count: usize) {
+        self.found.extend(first..first + count);
+    }
+}
+
+/// Boxes of the tree beside the shape's own box are passed over, none that holds a triangle in that box.
+#[test]
+fn passing_over_boxes_loses_no_triangle() {
+    let mut random = Random(0x0123_4567_89AB_CDEF);
+    let mesh = rough(&mut random);
+    let (mut walked, mut kept) = (0, 0);
+    for _ in 0..500 {
+        let pose = Pose::new(random.vector(), random.rotation());
+        let frame = frame_of(&pose);
+        let bounds = Aabb::from_center(Vec3::new(0.1, 0.3, 0.0), Vec3::new(0.1, 2.0, 0.1));
+        let aabb = bounds.transform(&pose);
+        let reach = Reach { margin: 0.0, scale: 0.01, second_look: false };
+        let center = pose.position;
+        let near = Near { frame: &frame, reach: &reach, bounds, size: 2.3, center, one_sided: true, behind: 0.0 };
+        let (mut all, mut some) =
+            (Collect { near: None, found: Vec::new() }, Collect { near: Some(&near), found: Vec::new() });
+        mesh.walk(&aabb, &mut all);
+        mesh.walk(&aabb, &mut some);
+        for &index in &all.found {
+            let local = mesh.corners(index).map(|corner| frame.inverse * (corner - frame.position));
+            if Aabb::from_points(local).overlaps(&bounds) {
+                assert!(some.found.contains(&index));
+            }
+        }
+        (walked, kept) = (walked + all.found.len(), kept + some.found.len());
+    }
+    assert!(kept < walked * 3 / 4, "{kept} of {walked}");
 }

@@ -17,9 +17,10 @@ use super::polyhedron::Polyhedron;
 use super::triangle::{Frame, Group, Reach, Solid, Triangle, feature_id, parallel_part};
 #[cfg(test)]
 use super::triangle_lanes::BACKWARD;
-use super::triangle_lanes::LeastOverlap;
-use crate::math::{Aabb, Real, Vec3, clamp, max, min};
-use crate::shape::TriangleMesh;
+use super::triangle_lanes::{EdgeSearch, FaceSearch, Overlaps, Planes, Search};
+use crate::math::{Aabb, Real, Vec3, clamp, max, max3, min, min3};
+use crate::shape::{Facet, LEAF as LANES, TriangleMesh};
+use crate::simd::{LaneVec3, Lanes};
 
 /// An edge, or the face, of a triangle lies level with its highest corner below this sine.
 const LEVEL_SINE: Real = 0.02;
@@ -40,22 +41,31 @@ const EXTRA_DEPTH: Real = 0.25;
 /// the scale.
 const BIAS: Real = 0.02;
 
-/// A cuboid or a hull with the ball around it.
+/// A cuboid or a hull with the box around it.
 pub(super) struct Solids<'a> {
     features: Polyhedron<'a>,
     bounds: Aabb,
-    outer_radius: Real,
     underside: Underside,
+    pending: Pending,
 }
 
-/// What of the solid is lowest over a triangle; the same for all triangles that face the same way.
-#[derive(Clone, Copy, Default)]
+/// Triangles that have no gap along any face and whose edges are to be tried, eight at a time.
+struct Pending {
+    facets: [Facet; LANES],
+    indices: [u32; LANES],
+    sides: [Real; LANES],
+    found: Overlaps,
+    count: usize,
+}
+
+/// What of the solid is lowest over a triangle.
+#[derive(Clone, Copy)]
 struct Underside {
     normal: Vec3,
     corner: usize,
     /// The face at that corner that lies flattest.
     face: usize,
-    /// A ball around that face.
+    /// A ball around that face; the radius is negative while there is no face.
     center: Vec3,
     radius: Real,
 }
@@ -70,9 +80,28 @@ enum Axis {
 
 impl<'a> Solids<'a> {
     pub(super) fn new(features: Polyhedron<'a>) -> Self {
-        let squared = features.vertices.iter().fold(0.0, |m, v| max(m, (*v - features.center).length_squared()));
-        let bounds = Aabb::from_points(features.vertices.iter().copied());
-        Self { features, bounds, outer_radius: squared.sqrt(), underside: Underside::default() }
+        let mut bounds = Aabb::EMPTY;
+        for &vertex in features.vertices {
+            bounds = Aabb::new(min3(bounds.min, vertex), max3(bounds.max, vertex));
+        }
+        let pending = Pending {
+            facets: [Facet::NONE; LANES],
+            indices: [0; LANES],
+            sides: [0.0; LANES],
+            found: Overlaps::default(),
+            count: 0,
+        };
+        Self { features, bounds, underside: Underside::NONE, pending }
+    }
+
+    fn search<'b>(
+        &'b self,
+        frame: &'b Frame,
+        facets: &'b [Facet; LANES],
+        sides: [Real; LANES],
+        reach: &Reach,
+    ) -> Search<'b> {
+        Search { solid: &self.features, frame, facets, sides, margin: reach.margin, bias: BIAS * reach.scale }
     }
 }
 
@@ -85,12 +114,23 @@ impl Solid for Solids<'_> {
         self.features.inner_radius
     }
 
-    fn outer_radius(&self) -> Real {
-        self.outer_radius
-    }
-
     fn bounds(&self) -> Aabb {
         self.bounds
+    }
+
+    #[inline(always)]
+    fn keep_reached<W: Lanes<LANES>>(&self, sides: W, planes: &Planes<W>, margin: Real) -> W {
+        let mut sides = planes.keep_low(sides, self.features.vertices, 0.0);
+        if sides.abs().positive() == 0 {
+            return sides;
+        }
+        let [a, b, c] = &planes.corners;
+        for plane in self.features.planes {
+            let outward = LaneVec3::splat(plane.normal);
+            let lowest = outward.dot(a).min(outward.dot(b).min(outward.dot(c)));
+            sides = W::splat(plane.offset + margin).if_at_least(lowest, sides, W::ZERO);
+        }
+        sides
     }
 
     fn touch_group(
@@ -101,26 +141,51 @@ impl Solid for Solids<'_> {
         reach: &Reach,
         out: &mut Candidates,
     ) -> bool {
-        if group.count == 0 {
+        let count = std::mem::take(&mut group.count);
+        if count == 0 {
             return false;
         }
-        let search = LeastOverlap {
-            solid: &self.features,
-            frame,
-            facets: group.facets(mesh),
-            sides: group.sides,
-            margin: reach.margin,
-            bias: BIAS * reach.scale,
-            shallow: if reach.second_look { -Real::MAX } else { SHALLOW * self.features.inner_radius },
-        };
-        let found = search.find();
+        let (mut facets, mut wanted, mut sharp) = ([Facet::NONE; LANES], [0.0; LANES], [0.0; LANES]);
+        for k in 0..count {
+            let index = group.indices[k] as usize;
+            facets[k] = mesh.facet(index);
+            wanted[k] = 1.0;
+            sharp[k] = if mesh.surroundings(index).is_plain() { 0.0 } else { 1.0 };
+        }
+        let search = self.search(frame, &facets, group.sides, reach);
+        let shallow = if reach.second_look { -Real::MAX } else { SHALLOW * self.features.inner_radius };
+        let found = FaceSearch { search, wanted, sharp, shallow }.find();
         let mut missing = false;
-        for k in 0..std::mem::take(&mut group.count) {
+        for k in 0..count {
             if found.near[k] > 0.0 {
-                let triangle = Triangle::new(mesh, frame, group.indices[k], group.sides[k]);
-                if self.underside.normal != triangle.normal {
-                    self.underside = Underside::new(&self.features, triangle.normal);
+                let place = self.pending.count;
+                self.pending.facets[place] = facets[k];
+                self.pending.indices[place] = group.indices[k];
+                self.pending.sides[place] = group.sides[k];
+                self.pending.found.take(place, &found, k);
+                self.pending.count += 1;
+                if self.pending.count == LANES {
+                    missing |= self.finish(mesh, frame, reach, out);
                 }
+            }
+        }
+        missing
+    }
+
+    fn finish(&mut self, mesh: &TriangleMesh, frame: &Frame, reach: &Reach, out: &mut Candidates) -> bool {
+        let count = std::mem::take(&mut self.pending.count);
+        let mut found = self.pending.found;
+        found.open[count..].fill(0.0);
+        if found.open != [0.0; LANES] {
+            let search = self.search(frame, &self.pending.facets, self.pending.sides, reach);
+            EdgeSearch { search, found: &mut found }.find();
+        }
+        let mut missing = false;
+        for k in 0..count {
+            if found.near[k] > 0.0 {
+                let place = (self.pending.indices[k], self.pending.sides[k]);
+                let triangle = Triangle::of(mesh, frame, &self.pending.facets[k], place);
+                self.underside.turn_to(&self.features, triangle.normal, found.corner[k] as usize);
                 let height = found.height[k];
                 let pair =
                     Pair { solid: &self.features, triangle: &triangle, reach, underside: &self.underside, height };
@@ -132,27 +197,29 @@ impl Solid for Solids<'_> {
 }
 
 impl Underside {
-    fn new(solid: &Polyhedron, normal: Vec3) -> Self {
-        let mut lowest = (0, Real::MAX);
-        for (i, vertex) in solid.vertices.iter().enumerate() {
-            let height = normal.dot(*vertex);
-            if height < lowest.1 {
-                lowest = (i, height);
-            }
+    const NONE: Self = Self { normal: Vec3::ZERO, corner: 0, face: 0, center: Vec3::ZERO, radius: -1.0 };
+
+    /// Makes it that over a plane with this normal, given the corner that is lowest there.
+    fn turn_to(&mut self, solid: &Polyhedron, normal: Vec3, corner: usize) {
+        if self.normal == normal && self.radius >= 0.0 {
+            return;
         }
         let mut flattest = (0, Real::MAX);
-        for edge in solid.edges {
-            if edge.origin as usize == lowest.0 {
-                let cosine = solid.planes[edge.face as usize].normal.dot(normal);
-                if cosine < flattest.1 {
-                    flattest = (edge.face as usize, cosine);
-                }
+        for &face in solid.faces_around(corner) {
+            let cosine = solid.planes[face as usize].normal.dot(normal);
+            if cosine < flattest.1 {
+                flattest = (face as usize, cosine);
             }
         }
-        let corners = || solid.face_loop(flattest.0).map(|edge| solid.edge_points(edge).0);
+        let face = flattest.0;
+        (self.normal, self.corner) = (normal, corner);
+        if self.face == face && self.radius >= 0.0 {
+            return;
+        }
+        let corners = || solid.face_loop(face).map(|edge| solid.edge_points(edge).0);
         let center = Aabb::from_points(corners()).center();
         let squared = corners().fold(0.0, |m, corner| max(m, (corner - center).length_squared()));
-        Self { normal, corner: lowest.0, face: flattest.0, center, radius: squared.sqrt() }
+        (self.face, self.center, self.radius) = (face, center, squared.sqrt());
     }
 }
 
@@ -227,7 +294,7 @@ impl Pair<'_> {
         }
         let (edge, solid_edge) = ((number - 1 - faces) / edges, 2 * ((number - 1 - faces) % edges));
         let (start, end) = self.triangle.edge(edge);
-        match self.edge_normal(edge, end - start, solid_edge) {
+        match self.edge_normal(end - start, solid_edge) {
             Some(normal) => Axis::Edges { edge, solid_edge, normal },
             None => Axis::Triangle,
         }
@@ -255,7 +322,7 @@ impl Pair<'_> {
             let (start, end) = self.triangle.edge(edge);
             let along = end - start;
             for solid_edge in (0..self.solid.edges.len()).step_by(2) {
-                let Some(normal) = self.edge_normal(edge, along, solid_edge) else { continue };
+                let Some(normal) = self.edge_normal(along, solid_edge) else { continue };
                 let origin = self.solid.vertices[self.solid.edges[solid_edge].origin as usize];
                 let separation = normal.dot(origin - start);
                 if !offer(Axis::Edges { edge, solid_edge, normal }, normal, separation) {
@@ -268,7 +335,7 @@ impl Pair<'_> {
 
     /// The axis of a pair of edges, from the triangle to the solid; `None` if the two cannot be the nearest features.
     #[inline]
-    fn edge_normal(&self, edge: usize, along: Vec3, solid_edge: usize) -> Option<Vec3> {
+    fn edge_normal(&self, along: Vec3, solid_edge: usize) -> Option<Vec3> {
         let a = self.solid.planes[self.solid.edges[solid_edge].face as usize].normal;
         let b = self.solid.planes[self.solid.edges[solid_edge + 1].face as usize].normal;
         let (da, db) = (a.dot(along), b.dot(along));
@@ -277,7 +344,7 @@ impl Pair<'_> {
         }
         let outward = a * db.abs() + b * da.abs();
         let squared = outward.length_squared();
-        if outward.dot(self.triangle.inward[edge]) <= 0.0 || squared < 1e-12 * along.length_squared() {
+        if outward.dot(self.triangle.front.cross(along)) <= 0.0 || squared < 1e-12 * along.length_squared() {
             return None;
         }
         Some(outward * (-1.0 / squared.sqrt()))
@@ -348,7 +415,7 @@ impl Pair<'_> {
         let first = self.solid.edge_points(self.solid.face_edges[face] as usize).0;
         let mut end = triangle.insides(first);
         // Corners amid a flat surface are no ends of the contact.
-        let bent = |i: usize| !(seams && triangle.facet.flat_corners >> i & 1 == 1);
+        let bent = |i: usize| !(seams && triangle.around.corner_is_flat(i));
         let mut under = [bent(0), bent(1), bent(2)];
         let any = under != [false; 3];
         for edge in self.solid.face_loop(face) {
@@ -377,7 +444,7 @@ impl Pair<'_> {
         for (i, corner) in triangle.corners.iter().enumerate() {
             if under[i] && slope < -0.01 && wanted.rims {
                 let gap = (plane.offset - plane.normal.dot(*corner)) / slope;
-                let feature = 512 + (triangle.facet.id << 2 | i as u32);
+                let feature = 512 + (triangle.around.id << 2 | i as u32);
                 points += self.face_point(*corner + triangle.normal * gap, wanted.least, feature, out);
             }
         }
@@ -386,7 +453,7 @@ impl Pair<'_> {
 
     /// Number of the point where side `cut` of this triangle's prism cuts an edge of the solid.
     fn cut(&self, edge: usize, cut: u32, end: u32) -> u32 {
-        feature_id(self.triangle.facet.id, 1024 + (((edge as u32) << 3) | (cut << 1) | end))
+        feature_id(self.triangle.around.id, 1024 + (((edge as u32) << 3) | (cut << 1) | end))
     }
 
     /// A point of the solid over (or under) the triangle.
@@ -546,7 +613,7 @@ impl Pair<'_> {
             position,
             normal: self.triangle.normal,
             separation: -depth,
-            feature: feature_id(self.triangle.facet.id, feature),
+            feature: feature_id(self.triangle.around.id, feature),
             facet: self.triangle.index,
         });
     }

@@ -1,21 +1,21 @@
 //! Triangle meshes: validation, the tree over the triangles, their neighbours, rays.
 //!
-//! The user's vertices and triangles are kept as given; beside them stand the triangles in the order of the tree, with
-//! corners, normal and neighbourhood in place, so that a query touches consecutive memory. Every number reported to the
-//! user is a position in the user's list.
+//! A mesh holds the user's vertices and triangles as given, 16 bytes a triangle about its neighbourhood in the order of the
+//! tree, and the tree: 40 bytes a triangle in all. Corners and normals are made from them as they are needed. Every number
+//! reported to the user is a position in the user's list.
 //!
 //! Rays use the watertight test of Woop, Benthin and Wald ("Watertight Ray/Triangle Intersection", 2013) with its edge
 //! functions in double precision: both sides of a shared edge compute the same number with opposite sign, so a ray
 //! cannot slip through between them.
 
 use super::ShapeError;
-use super::mesh_edges::{Adjacency, Neighborhood};
-use super::mesh_tree::{MeshTree, Slabs};
-use crate::math::{Aabb, Real, Vec3};
-use crate::simd::{LaneVec3, Wide};
+use super::mesh_edges::{Adjacency, Surface, Surroundings};
+use super::mesh_tree::{LEAF, Leaves, MeshTree, Slabs};
+use crate::math::{Aabb, Real, Vec3, max3, min3};
+use crate::simd::{LaneVec3, Lanes, Quad};
+use glam::DVec3;
 
 pub use super::mesh_edges::MeshEdge;
-pub use super::mesh_tree::MeshNode;
 
 /// Which side of its triangles a mesh is solid on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -38,50 +38,30 @@ pub struct MeshRayHit {
     pub triangle: u32,
 }
 
-/// A triangle in the order of the tree: what every contact reads. 96 bytes.
+/// Corners and unit normal of a triangle, as three groups of four numbers: so eight of them become lanes at once.
 #[derive(Clone, Copy, Debug)]
-#[repr(C)]
 pub(crate) struct Facet {
-    pub(crate) corners: [Vec3; 3],
-    pub(crate) normal: Vec3,
-    /// Unit vectors in the plane from each edge inwards.
-    pub(crate) inward: [Vec3; 3],
-    /// Number in the user's list.
-    pub(crate) id: u32,
-    /// Equal for triangles joined by flat edges.
-    pub(crate) patch: u32,
-    /// Bit `i`: edge `i` (from corner `i` to the next) is convex or open, so that it can touch by itself.
-    pub(crate) sharp_edges: u8,
-    /// Bit `i`: such an edge ends in corner `i`.
-    pub(crate) sharp_corners: u8,
-    /// Bit `i`: the surface goes on flat across edge `i`.
-    pub(crate) flat_edges: u8,
-    /// Bit `i`: all around corner `i` the surface is flat.
-    pub(crate) flat_corners: u8,
+    pub(crate) quads: [Quad; 3],
 }
 
-/// Triangles in an [`Octet`].
-pub(crate) const OCTET: usize = 8;
+impl Facet {
+    pub(crate) const NONE: Self = Self { quads: [[0.0; 4]; 3] };
 
-/// Corners and normals of eight consecutive triangles side by side: what tells whether one of them is near. Those past the
-/// end of the mesh are zero.
-#[derive(Clone, Copy, Debug)]
-#[repr(C)]
-pub(crate) struct Octet {
-    pub(crate) corners: [LaneVec3<Wide<OCTET>>; 3],
-    pub(crate) normal: LaneVec3<Wide<OCTET>>,
-}
+    #[inline(always)]
+    fn new([a, b, c]: [Vec3; 3], normal: Vec3) -> Self {
+        Self { quads: [[a.x, a.y, a.z, b.x], [b.y, b.z, c.x, c.y], [c.z, normal.x, normal.y, normal.z]] }
+    }
 
-impl Octet {
-    fn new(facets: &[Facet]) -> Self {
-        let mut octet = Self { corners: [LaneVec3::ZERO; 3], normal: LaneVec3::ZERO };
-        for (lane, facet) in facets.iter().enumerate() {
-            for (corners, corner) in octet.corners.iter_mut().zip(facet.corners) {
-                corners.set::<OCTET>(lane, corner);
-            }
-            octet.normal.set::<OCTET>(lane, facet.normal);
-        }
-        octet
+    #[inline(always)]
+    pub(crate) fn corners(&self) -> [Vec3; 3] {
+        let [a, b, c] = &self.quads;
+        [Vec3::new(a[0], a[1], a[2]), Vec3::new(a[3], b[0], b[1]), Vec3::new(b[2], b[3], c[0])]
+    }
+
+    #[inline(always)]
+    pub(crate) fn normal(&self) -> Vec3 {
+        let [_, x, y, z] = self.quads[2];
+        Vec3::new(x, y, z)
     }
 }
 
@@ -97,14 +77,13 @@ impl Octet {
 /// ```
 #[derive(Clone, Debug)]
 pub struct TriangleMesh {
+    /// The user's and one more, so that four numbers can be read wherever a vertex starts.
     vertices: Vec<Vec3>,
     triangles: Vec<[u32; 3]>,
     sides: MeshSides,
     tree: MeshTree,
-    facets: Vec<Facet>,
-    octets: Vec<Octet>,
-    neighborhoods: Vec<Neighborhood>,
-    adjacency: Adjacency,
+    /// In the order of the tree.
+    surroundings: Vec<Surroundings>,
 }
 
 impl TriangleMesh {
@@ -125,7 +104,9 @@ impl TriangleMesh {
         let normals = triangles
             .iter()
             .enumerate()
-            .map(|(triangle, t)| normal_of(&vertices, t).ok_or(ShapeError::DegenerateTriangle { triangle }))
+            .map(|(triangle, t)| {
+                normal_of(t.map(|i| vertices[i as usize])).ok_or(ShapeError::DegenerateTriangle { triangle })
+            })
             .collect::<Result<Vec<Vec3>, _>>()?;
         Ok(Self::build(vertices, triangles, sides, &normals))
     }
@@ -151,7 +132,7 @@ impl TriangleMesh {
         check(&vertices, &triangles)?;
         let given = triangles.len();
         let kept: Vec<([u32; 3], Vec3)> =
-            triangles.into_iter().filter_map(|t| normal_of(&vertices, &t).map(|n| (t, n))).collect();
+            triangles.into_iter().filter_map(|t| normal_of(t.map(|i| vertices[i as usize])).map(|n| (t, n))).collect();
         if kept.is_empty() {
             return Err(ShapeError::EmptyMesh);
         }
@@ -160,44 +141,29 @@ impl TriangleMesh {
         Ok((Self::build(vertices, triangles, sides, &normals), left_out))
     }
 
-    fn build(vertices: Vec<Vec3>, triangles: Vec<[u32; 3]>, sides: MeshSides, normals: &[Vec3]) -> Self {
-        let corners = |t: &[u32; 3]| t.map(|i| vertices[i as usize]);
-        let boxes: Vec<Aabb> = triangles.iter().map(|t| Aabb::from_points(corners(t))).collect();
-        let (tree, order) = MeshTree::build(&boxes);
-        let mut adjacency = Adjacency::new(&vertices, &triangles, normals);
-        adjacency.close_seams(&vertices, &triangles, normals, |point, gap, visit| {
+    fn build(mut vertices: Vec<Vec3>, mut triangles: Vec<[u32; 3]>, sides: MeshSides, normals: &[Vec3]) -> Self {
+        let surface = Surface { vertices: &vertices, triangles: &triangles, normals };
+        let boxes = triangles.iter().map(|t| {
+            let [a, b, c] = t.map(|i| vertices[i as usize]);
+            Aabb::new(min3(a, min3(b, c)), max3(a, max3(b, c)))
+        });
+        let (tree, order) = MeshTree::build(boxes);
+        let mut adjacency = Adjacency::new(&surface);
+        adjacency.close_seams(|point, gap, visit| {
             tree.query(&Aabb::from_center(point, Vec3::splat(gap)), |slot| visit(order[slot]));
         });
-        adjacency.mark_corners();
-        let facet = |&id: &u32| {
-            let neighborhood = &adjacency.triangles[id as usize];
-            let bits = |bit: &dyn Fn(usize) -> bool| (0..3).map(|i| u8::from(bit(i)) << i).sum();
-            let sharp_edge = |i: usize| matches!(neighborhood.kinds[i], MeshEdge::Boundary | MeshEdge::Convex);
-            let corner = |i: usize| neighborhood.corners[i] as usize;
-            Facet {
-                corners: corners(&triangles[id as usize]),
-                normal: normals[id as usize],
-                inward: adjacency.own[id as usize],
-                id,
-                patch: adjacency.patches[id as usize],
-                sharp_edges: bits(&sharp_edge),
-                sharp_corners: bits(&|i| adjacency.sharp[corner(i)]),
-                flat_edges: bits(&|i| neighborhood.kinds[i] == MeshEdge::Flat),
-                flat_corners: bits(&|i| !adjacency.bent[corner(i)]),
-            }
-        };
-        let facets: Vec<Facet> = order.iter().map(facet).collect();
-        let octets = facets.chunks(OCTET).map(Octet::new).collect();
-        let neighborhoods = order.iter().map(|&id| adjacency.triangles[id as usize]).collect();
-        (adjacency.triangles, adjacency.own, adjacency.patches) = (Vec::new(), Vec::new(), Vec::new());
-        (adjacency.sharp, adjacency.bent) = (Vec::new(), Vec::new());
-        Self { vertices, triangles, sides, tree, facets, octets, neighborhoods, adjacency }
+        let surroundings = adjacency.finish(&order);
+        vertices.reserve_exact(1);
+        vertices.push(Vec3::ZERO);
+        vertices.shrink_to_fit();
+        triangles.shrink_to_fit();
+        Self { vertices, triangles, sides, tree, surroundings }
     }
 
     /// Corner positions, metres.
     #[must_use]
     pub fn vertices(&self) -> &[Vec3] {
-        &self.vertices
+        &self.vertices[..self.vertices.len() - 1]
     }
 
     /// Triangles as given: three indices into the vertices.
@@ -212,16 +178,10 @@ impl TriangleMesh {
         self.sides
     }
 
-    /// The nodes of the tree, depth first.
-    #[must_use]
-    pub fn nodes(&self) -> &[MeshNode] {
-        self.tree.nodes()
-    }
-
     /// Calls `visit` with the corners and the number of every triangle whose box overlaps `aabb`. No allocation.
     #[inline]
     pub fn for_each_triangle(&self, aabb: &Aabb, mut visit: impl FnMut([Vec3; 3], u32)) {
-        self.for_each_facet(aabb, |index| visit(self.facets[index].corners, self.facets[index].id));
+        self.for_each_facet(aabb, |index| visit(self.corners(index), self.surroundings[index].id));
     }
 
     /// The first triangle that the ray meets between `origin` and `origin + limit · direction`; one-sided meshes are met
@@ -229,67 +189,126 @@ impl TriangleMesh {
     #[must_use]
     pub fn cast_ray(&self, origin: Vec3, direction: Vec3, limit: Real) -> Option<MeshRayHit> {
         let ray = Ray::new(origin, direction)?;
-        let mut best: Option<MeshRayHit> = None;
+        let mut best: Option<(Real, usize, bool)> = None;
         let mut reach = limit;
         self.tree.cast(&Slabs::new(origin, direction), limit, |index| {
-            if let Some(hit) = ray.hit(&self.facets[index], self.sides)
-                && hit.distance <= reach
-                && best.is_none_or(|b| (hit.distance, hit.triangle) < (b.distance, b.triangle))
+            let id = self.surroundings[index].id;
+            if let Some((distance, back)) = ray.hit(&self.corners(index), self.sides)
+                && distance <= reach
+                && best.is_none_or(|(d, other, _)| (distance, id) < (d, self.surroundings[other].id))
             {
-                reach = hit.distance;
-                best = Some(hit);
+                reach = distance;
+                best = Some((distance, index, back));
             }
             reach
         });
-        best
+        best.map(|(distance, index, back)| {
+            let normal = self.facet(index).normal();
+            let normal = if back { -normal } else { normal };
+            MeshRayHit { distance, normal, triangle: self.surroundings[index].id }
+        })
     }
 
     pub(crate) fn local_aabb(&self) -> Aabb {
-        self.tree.nodes()[0].aabb
+        self.tree.around()
     }
 
     /// Calls `visit` with the internal number of every triangle whose box overlaps `aabb`, in ascending order.
     #[inline]
     pub(crate) fn for_each_facet(&self, aabb: &Aabb, mut visit: impl FnMut(usize)) {
         self.tree.query(aabb, |index| {
-            let [a, b, c] = self.facets[index].corners;
-            let around =
-                Aabb::new(crate::math::min3(a, crate::math::min3(b, c)), crate::math::max3(a, crate::math::max3(b, c)));
-            if around.overlaps(aabb) {
+            let [a, b, c] = self.corners(index);
+            if Aabb::new(min3(a, min3(b, c)), max3(a, max3(b, c))).overlaps(aabb) {
                 visit(index);
             }
         });
     }
 
-    /// Calls `visit` with the internal number of every triangle in a leaf of the tree whose box overlaps `aabb`, in
-    /// ascending order.
-    #[inline(always)]
-    pub(crate) fn for_each_candidate(&self, aabb: &Aabb, visit: impl FnMut(usize)) {
-        self.tree.query(aabb, visit);
-    }
-
-    /// Triangles `8 index` to `8 index + 7` by their internal numbers.
-    #[inline(always)]
-    pub(crate) fn octet(&self, index: usize) -> &Octet {
-        &self.octets[index]
-    }
-
-    /// A triangle by its internal number.
-    #[inline(always)]
-    pub(crate) fn facet(&self, index: usize) -> &Facet {
-        &self.facets[index]
-    }
-
-    /// The neighbours of a triangle by its internal number.
-    #[inline(always)]
-    pub(crate) fn neighborhood(&self, index: usize) -> &Neighborhood {
-        &self.neighborhoods[index]
-    }
-
-    /// The far ends of all edges that meet in a welded corner, and their welded numbers.
+    /// Shows the leaves of the tree whose boxes overlap the given one.
     #[inline]
-    pub(crate) fn corner_ends(&self, corner: u32) -> impl Iterator<Item = (Vec3, u32)> {
-        self.adjacency.ends(corner).iter().map(|&end| (self.vertices[end as usize], end))
+    pub(crate) fn walk(&self, aabb: &Aabb, leaves: &mut impl Leaves) {
+        self.tree.walk(aabb, leaves);
+    }
+
+    /// Corners of a triangle by its internal number.
+    #[inline(always)]
+    pub(crate) fn corners(&self, index: usize) -> [Vec3; 3] {
+        let [a, b, c] = self.triangles[self.surroundings[index].id as usize];
+        [self.vertices[a as usize], self.vertices[b as usize], self.vertices[c as usize]]
+    }
+
+    /// Corners and normal of a triangle by its internal number.
+    #[inline(always)]
+    pub(crate) fn facet(&self, index: usize) -> Facet {
+        let corners = self.corners(index);
+        let cross = cross_of(&corners);
+        Facet::new(corners, (cross * (1.0 / cross.length())).as_vec3())
+    }
+
+    /// The triangles of a leaf side by side; lanes past the last hold that one again.
+    #[inline(always)]
+    pub(crate) fn corners_of_leaf<W: Lanes<LEAF>>(&self, first: usize, count: usize) -> [LaneVec3<W>; 3] {
+        let around = &self.surroundings[first..first + count];
+        let mut triangles = [&[0; 3]; LEAF];
+        for (lane, triangle) in triangles.iter_mut().enumerate() {
+            let id = around[lane.min(count - 1)].id as usize;
+            debug_assert!(id < self.triangles.len());
+            // SAFETY: the ids are the numbers of the triangles in another order, and neither list changes.
+            *triangle = unsafe { self.triangles.get_unchecked(id) };
+        }
+        let mut corners = [LaneVec3::ZERO; 3];
+        for (i, corner) in corners.iter_mut().enumerate() {
+            let mut quads = [&[0.0; 4]; LEAF];
+            for (quad, triangle) in quads.iter_mut().zip(&triangles) {
+                *quad = self.quad(triangle[i]);
+            }
+            let [x, y, z, _] = W::load(&quads);
+            *corner = LaneVec3 { x, y, z };
+        }
+        corners
+    }
+
+    /// The coordinates of a vertex of a triangle and one number more.
+    #[inline(always)]
+    fn quad(&self, vertex: u32) -> &Quad {
+        debug_assert!(vertex as usize + 1 < self.vertices.len());
+        // SAFETY: `check` has found that all corners are vertices of the user's, after which one more stands, and neither list
+        // changes: two vertices are six numbers in a row, of which these are the first four. To check it at each of the 24
+        // corners of a leaf took as long as all that is computed of them.
+        unsafe { &*self.vertices.as_ptr().add(vertex as usize).cast::<Quad>() }
+    }
+
+    /// What is known about the edges and corners of a triangle by its internal number.
+    #[inline(always)]
+    pub(crate) fn surroundings(&self, index: usize) -> &Surroundings {
+        &self.surroundings[index]
+    }
+
+    /// Calls `visit` with the far ends of all edges that meet in a corner, some of them twice, until it returns false.
+    pub(crate) fn each_end(&self, corner: Vec3, visit: impl FnMut(Vec3) -> bool) {
+        self.tree.walk(&Aabb::new(corner, corner), &mut Ends { mesh: self, corner, visit, goes_on: true });
+    }
+}
+
+/// The far ends of the edges of a corner.
+struct Ends<'a, F> {
+    mesh: &'a TriangleMesh,
+    corner: Vec3,
+    visit: F,
+    goes_on: bool,
+}
+
+impl<F: FnMut(Vec3) -> bool> Leaves for Ends<'_, F> {
+    #[inline(always)]
+    fn leaf<W: Lanes<LEAF>>(&mut self, first: usize, count: usize) {
+        for index in first..first + count {
+            let corners = self.mesh.corners(index);
+            for i in 0..3 {
+                if self.goes_on && corners[i] == self.corner {
+                    self.goes_on = (self.visit)(corners[(i + 1) % 3]) && (self.visit)(corners[(i + 2) % 3]);
+                }
+            }
+        }
     }
 }
 
@@ -308,20 +327,29 @@ fn check(vertices: &[Vec3], triangles: &[[u32; 3]]) -> Result<(), ShapeError> {
     Ok(())
 }
 
+/// Twice the area along the normal.
+#[inline(always)]
+fn cross_of([a, b, c]: &[Vec3; 3]) -> DVec3 {
+    let a = a.as_dvec3();
+    (b.as_dvec3() - a).cross(c.as_dvec3() - a)
+}
+
 /// Unit normal; `None` where the height over the longest edge is below a millionth of that edge, so that rounding would
 /// decide which way the triangle faces.
-fn normal_of(vertices: &[Vec3], triangle: &[u32; 3]) -> Option<Vec3> {
-    let [a, b, c] = triangle.map(|i| vertices[i as usize].as_dvec3());
-    let cross = (b - a).cross(c - a);
-    let longest = [b - a, c - b, a - c].iter().map(|e| e.length_squared()).fold(0.0, |m, e| if e > m { e } else { m });
+#[inline(always)]
+fn normal_of([a, b, c]: [Vec3; 3]) -> Option<Vec3> {
+    let cross = cross_of(&[a, b, c]);
+    let (a, b, c) = (a.as_dvec3(), b.as_dvec3(), c.as_dvec3());
+    let larger = |x: f64, y: f64| if x > y { x } else { y };
+    let longest =
+        larger((b - a).length_squared(), larger((c - b).length_squared(), larger((a - c).length_squared(), 0.0)));
     let length = cross.length();
-    (length > 1e-6 * longest).then(|| (cross / length).as_vec3())
+    (length > 1e-6 * longest).then(|| (cross * (1.0 / length)).as_vec3())
 }
 
 /// A ray in the frame of the watertight test: sheared so that it runs along its longest axis.
 struct Ray {
     origin: Vec3,
-    direction: Vec3,
     axes: [usize; 3],
     shear: [f64; 3],
 }
@@ -335,17 +363,14 @@ impl Ray {
         }
         let (x, y) = ((z + 1) % 3, (z + 2) % 3);
         let d = direction.as_dvec3();
-        Some(Self { origin, direction, axes: [x, y, z], shear: [d[x] / d[z], d[y] / d[z], 1.0 / d[z]] })
+        Some(Self { origin, axes: [x, y, z], shear: [d[x] / d[z], d[y] / d[z], 1.0 / d[z]] })
     }
 
-    fn hit(&self, facet: &Facet, sides: MeshSides) -> Option<MeshRayHit> {
-        let facing = facet.normal.dot(self.direction);
-        if sides == MeshSides::One && facing >= 0.0 {
-            return None;
-        }
+    /// How far along the ray a triangle is met, and whether from behind.
+    fn hit(&self, corners: &[Vec3; 3], sides: MeshSides) -> Option<(Real, bool)> {
         let origin = self.origin.as_dvec3();
         let [x, y, z] = self.axes;
-        let sheared = facet.corners.map(|corner| {
+        let sheared = corners.map(|corner| {
             let p = corner.as_dvec3() - origin;
             [p[x] - self.shear[0] * p[z], p[y] - self.shear[1] * p[z], self.shear[2] * p[z]]
         });
@@ -361,8 +386,9 @@ impl Ray {
             return None;
         }
         let distance = ((u * a[2] + v * b[2] + w * c[2]) / sum) as Real;
-        let normal = if facing > 0.0 { -facet.normal } else { facet.normal };
-        (distance >= 0.0).then_some(MeshRayHit { distance, normal, triangle: facet.id })
+        // The sum is minus twice the area as seen along the axis, which the ray may run down.
+        let back = (sum < 0.0) != (self.shear[2] < 0.0);
+        (distance >= 0.0 && !(back && sides == MeshSides::One)).then_some((distance, back))
     }
 }
 

@@ -8,6 +8,10 @@
 //! Corners are joined by position, so triangles that share no indices are neighbours all the same, and an open edge that
 //! runs along another triangle (a T-junction) is a seam with that one. Where more than two
 //! triangles meet at an edge, the neighbour that closes most of the front side counts.
+//!
+//! Of all this a mesh keeps six bytes a triangle: by which angle the surface bends at each edge ([`Bend`]), from which the
+//! direction into the neighbour follows. Neighbours themselves are not kept: where a corner's edges are asked for, the
+//! tree finds the triangles that have that corner.
 
 use crate::math::{Real, Vec3};
 
@@ -32,81 +36,219 @@ const FLAT_SINE: Real = 1e-3;
 /// An open edge is closed by a triangle no farther from its middle than this share of its length.
 const SEAM_GAP: Real = 1e-4;
 
-/// The neighbourhood of one triangle.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Neighborhood {
-    /// Unit vector in the plane of the neighbour across edge `i`, at a right angle to the edge and away from it; zero at a boundary.
-    pub(crate) inward: [Vec3; 3],
-    /// Welded number of corner `i`.
-    pub(crate) corners: [u32; 3],
-    pub(crate) kinds: [MeshEdge; 3],
+/// By which angle the surface bends across an edge, in steps of a ten thousandth of a radian: positive towards the front.
+///
+/// The angle is told by `s / (|s| + |c|)` of its sine and cosine, continued to ±2 past a right angle: no trigonometry, and
+/// level surfaces, right angles and the diagonals between them are exact.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Bend(i16);
+
+impl Bend {
+    const BOUNDARY: Self = Self(i16::MIN);
+    /// Steps up to a right angle.
+    const QUARTER: Real = 16000.0;
+    /// Steps that count as flat: [`FLAT_SINE`].
+    const FLAT: i16 = 16;
+
+    /// The bend from a triangle (unit normal, unit vector inwards from the edge) to a neighbour (unit vector away from the
+    /// edge).
+    fn new(kind: MeshEdge, normal: Vec3, own: Vec3, neighbor: Vec3) -> Self {
+        if kind == MeshEdge::Boundary {
+            return Self::BOUNDARY;
+        }
+        let (sine, cosine) = (neighbor.dot(normal), -neighbor.dot(own));
+        let share = sine / (sine.abs() + cosine.abs());
+        let turn = if cosine >= 0.0 { share } else { (2.0_f32 - share.abs()).copysign(sine) };
+        let steps = (turn * Self::QUARTER + if turn < 0.0 { -0.5 } else { 0.5 }) as i16;
+        let most = 2 * Self::QUARTER as i16;
+        // Rounding must not change the kind.
+        Self(match kind {
+            MeshEdge::Concave => steps.clamp(Self::FLAT + 1, most),
+            MeshEdge::Convex if steps >= -Self::FLAT && cosine < 0.0 => -most,
+            MeshEdge::Convex => steps.clamp(-most, -Self::FLAT - 1),
+            _ => steps.clamp(-Self::FLAT, Self::FLAT),
+        })
+    }
+
+    pub(crate) fn kind(self) -> MeshEdge {
+        match self.0 {
+            i16::MIN => MeshEdge::Boundary,
+            steps if steps > Self::FLAT => MeshEdge::Concave,
+            steps if steps < -Self::FLAT => MeshEdge::Convex,
+            _ => MeshEdge::Flat,
+        }
+    }
+
+    /// Unit vector in the plane of the neighbour, at a right angle to the edge and away from it, for a triangle with that
+    /// normal and that vector inwards from the edge; zero at a boundary.
+    pub(crate) fn across(self, normal: Vec3, own: Vec3) -> Vec3 {
+        if self == Self::BOUNDARY {
+            return Vec3::ZERO;
+        }
+        let turn = Real::from(self.0) * (1.0 / Self::QUARTER);
+        let sine = if turn.abs() <= 1.0 { turn } else { (2.0 - turn.abs()).copysign(turn) };
+        let cosine = 1.0 - turn.abs();
+        (normal * sine - own * cosine) * (1.0 / (sine * sine + cosine * cosine).sqrt())
+    }
 }
 
-/// The welded corners, their neighbours, and the neighbourhood of each triangle.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Adjacency {
-    pub(super) triangles: Vec<Neighborhood>,
-    /// For each triangle the unit vectors in its own plane from its edges inwards.
-    pub(super) own: Vec<[Vec3; 3]>,
-    /// For each triangle the smallest number of those it is joined to by flat edges.
-    pub(super) patches: Vec<u32>,
-    /// For each welded corner whether a convex or open edge ends there.
-    pub(super) sharp: Vec<bool>,
-    /// For each welded corner whether any edge that ends there is not flat.
-    pub(super) bent: Vec<bool>,
-    first: Vec<u32>,
-    ends: Vec<u32>,
+/// What is kept of a triangle and of those around it, beside the user's lists. 16 bytes.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub(crate) struct Surroundings {
+    /// Number in the user's list.
+    pub(crate) id: u32,
+    /// Equal for triangles joined by flat edges.
+    pub(crate) patch: u32,
+    bends: [Bend; 3],
+    /// Three bits each: sharp edges, flat edges, sharp corners, flat corners.
+    bits: u16,
 }
 
-/// One side of an edge: its welded ends in ascending order, then whose it is.
-type Side = (u32, u32, u32, u32);
+impl Surroundings {
+    /// How the surface bends across edge `i` (from corner `i` to the next).
+    pub(crate) fn bend(&self, i: usize) -> Bend {
+        self.bends[i]
+    }
 
-impl Adjacency {
-    pub(super) fn new(vertices: &[Vec3], triangles: &[[u32; 3]], normals: &[Vec3]) -> Self {
-        let welded = weld(vertices);
+    /// Whether edge `i` is convex or open, so that it can touch by itself.
+    #[inline(always)]
+    pub(crate) fn edge_is_sharp(&self, i: usize) -> bool {
+        self.bits >> i & 1 == 1
+    }
+
+    /// Whether the surface goes on flat across edge `i`; never for 3, which is none.
+    #[inline(always)]
+    pub(crate) fn edge_is_flat(&self, i: usize) -> bool {
+        i < 3 && self.bits >> (3 + i) & 1 == 1
+    }
+
+    /// Whether a sharp edge ends in corner `i`.
+    #[inline(always)]
+    pub(crate) fn corner_is_sharp(&self, i: usize) -> bool {
+        self.bits >> (6 + i) & 1 == 1
+    }
+
+    /// Whether all around corner `i` the surface is flat.
+    #[inline(always)]
+    pub(crate) fn corner_is_flat(&self, i: usize) -> bool {
+        self.bits >> (9 + i) & 1 == 1
+    }
+
+    /// Whether no edge and no corner can touch, only the face.
+    #[inline(always)]
+    pub(crate) fn is_plain(&self) -> bool {
+        self.bits & 0o707 == 0
+    }
+}
+
+/// What a mesh is made of, while its edges are looked at.
+pub(super) struct Surface<'a> {
+    pub(super) vertices: &'a [Vec3],
+    pub(super) triangles: &'a [[u32; 3]],
+    pub(super) normals: &'a [Vec3],
+}
+
+impl Surface<'_> {
+    fn corner(&self, triangle: u32, i: u32) -> Vec3 {
+        self.vertices[self.triangles[triangle as usize][(i % 3) as usize] as usize]
+    }
+
+    /// Unit vector in the plane of a triangle from its edge inwards.
+    fn inward(&self, triangle: u32, edge: u32) -> Vec3 {
+        let along = self.corner(triangle, edge + 1).as_dvec3() - self.corner(triangle, edge).as_dvec3();
+        let across = self.normals[triangle as usize].as_dvec3().cross(along);
+        (across / across.length()).as_vec3()
+    }
+}
+
+/// How the triangles of a mesh are joined; gone once the mesh is built.
+pub(super) struct Adjacency<'a> {
+    surface: &'a Surface<'a>,
+    /// For each vertex the first one at the same position.
+    welded: Vec<u32>,
+    bends: Vec<[Bend; 3]>,
+    /// For each triangle one that it is joined to by a flat edge, with a smaller number, or itself.
+    patches: Vec<u32>,
+    /// For each welded corner [`SHARP`] if a convex or open edge ends there, [`BENT`] if any edge that is not flat does.
+    corners: Vec<u8>,
+}
+
+const SHARP: u8 = 1;
+const BENT: u8 = 2;
+
+/// One side of an edge: the welded end with the larger number, then whose it is.
+#[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
+struct Side {
+    end: u32,
+    triangle: u32,
+    edge: u32,
+}
+
+impl<'a> Adjacency<'a> {
+    pub(super) fn new(surface: &'a Surface<'a>) -> Self {
         let mut adjacency = Self {
-            triangles: triangles
-                .iter()
-                .map(|t| Neighborhood { corners: t.map(|i| welded[i as usize]), ..Neighborhood::default() })
-                .collect(),
-            own: vec![[Vec3::ZERO; 3]; triangles.len()],
-            patches: (0..triangles.len() as u32).collect(),
-            sharp: vec![false; vertices.len()],
-            bent: vec![false; vertices.len()],
-            ..Self::default()
+            surface,
+            welded: weld(surface.vertices),
+            bends: vec![[Bend::BOUNDARY; 3]; surface.triangles.len()],
+            patches: (0..surface.triangles.len() as u32).collect(),
+            corners: vec![0; surface.vertices.len()],
         };
-        let sides = adjacency.sides();
-        let inward = |side: &Side| inward(vertices, &triangles[side.2 as usize], normals[side.2 as usize], side.3);
-        for group in sides.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
-            for side in group {
-                let others = group.iter().filter(|other| other.2 != side.2);
-                let candidates = others.map(|other| (other.2, inward(other)));
-                adjacency.join(side, normals[side.2 as usize], inward(side), candidates);
+        let (first, mut sides) = adjacency.sides();
+        let mut inwards = Vec::new();
+        for range in first.windows(2) {
+            let at_corner = &mut sides[range[0] as usize..range[1] as usize];
+            at_corner.sort_unstable();
+            for group in at_corner.chunk_by(|a, b| a.end == b.end) {
+                inwards.clear();
+                inwards.extend(group.iter().map(|side| surface.inward(side.triangle, side.edge)));
+                for (k, side) in group.iter().enumerate() {
+                    let others = group.iter().zip(&inwards).filter(|(other, _)| other.triangle != side.triangle);
+                    adjacency.join(side, inwards[k], others.map(|(other, inward)| (other.triangle, *inward)));
+                }
             }
         }
-        adjacency.link_corners(vertices.len(), &sides);
         adjacency
     }
 
-    /// The welded corners that edges join to a welded corner.
-    pub(super) fn ends(&self, corner: u32) -> &[u32] {
-        &self.ends[self.first[corner as usize] as usize..self.first[corner as usize + 1] as usize]
+    fn welded_corner(&self, triangle: u32, i: usize) -> u32 {
+        self.welded[self.surface.triangles[triangle as usize][i % 3] as usize]
     }
 
-    fn sides(&self) -> Vec<Side> {
-        let mut sides: Vec<Side> = Vec::with_capacity(3 * self.triangles.len());
-        for (index, triangle) in self.triangles.iter().enumerate() {
+    /// The sides of all edges, those of each welded corner in a row: where each row starts, and the sides. A side belongs
+    /// to the end with the smaller number.
+    fn sides(&self) -> (Vec<u32>, Vec<Side>) {
+        let triangles = self.surface.triangles.len() as u32;
+        let ends = |triangle: u32, edge: usize| {
+            let (a, b) = (self.welded_corner(triangle, edge), self.welded_corner(triangle, edge + 1));
+            (a.min(b), a.max(b))
+        };
+        let mut first = vec![0; self.welded.len() + 1];
+        for triangle in 0..triangles {
             for edge in 0..3 {
-                let (a, b) = (triangle.corners[edge], triangle.corners[(edge + 1) % 3]);
-                sides.push((a.min(b), a.max(b), index as u32, edge as u32));
+                first[ends(triangle, edge).0 as usize] += 1;
             }
         }
-        sides.sort_unstable();
-        sides
+        // Each row's end; filling it backwards leaves its start.
+        let mut sum = 0;
+        for count in &mut first {
+            sum += *count;
+            *count = sum;
+        }
+        let mut sides = vec![Side::default(); sum as usize];
+        for triangle in 0..triangles {
+            for edge in 0..3 {
+                let (start, end) = ends(triangle, edge);
+                first[start as usize] -= 1;
+                sides[first[start as usize] as usize] = Side { end, triangle, edge: edge as u32 };
+            }
+        }
+        (first, sides)
     }
 
     /// Records the neighbour across one side that closes most of the front.
-    fn join(&mut self, side: &Side, normal: Vec3, own: Vec3, others: impl Iterator<Item = (u32, Vec3)>) {
+    fn join(&mut self, side: &Side, own: Vec3, others: impl Iterator<Item = (u32, Vec3)>) {
+        let normal = self.surface.normals[side.triangle as usize];
         let mut closest: Option<(Real, u32, Vec3)> = None;
         for (other, inward) in others {
             let closing = closing(inward, normal, own);
@@ -114,77 +256,87 @@ impl Adjacency {
                 closest = Some((closing, other, inward));
             }
         }
-        let kind = match closest {
-            None => MeshEdge::Boundary,
-            Some((closing, ..)) if closing > FLAT_SINE => MeshEdge::Concave,
-            Some((closing, ..)) if closing < -FLAT_SINE => MeshEdge::Convex,
-            Some(_) => MeshEdge::Flat,
+        let Some((closing, other, inward)) = closest else { return };
+        let kind = if closing > FLAT_SINE {
+            MeshEdge::Concave
+        } else if closing < -FLAT_SINE {
+            MeshEdge::Convex
+        } else {
+            MeshEdge::Flat
         };
-        let triangle = &mut self.triangles[side.2 as usize];
-        triangle.kinds[side.3 as usize] = kind;
-        self.own[side.2 as usize][side.3 as usize] = own;
-        if let Some((_, other, inward)) = closest {
-            triangle.inward[side.3 as usize] = inward;
-            if kind == MeshEdge::Flat {
-                self.join_patches(side.2, other);
-            }
+        self.bends[side.triangle as usize][side.edge as usize] = Bend::new(kind, normal, own, inward);
+        if kind == MeshEdge::Flat {
+            self.join_patches(side.triangle, other);
         }
     }
 
     /// Closes the open edges that run along another triangle without sharing its corners (T-junctions): `near` calls back
     /// with the triangles around a point. The middle of the edge decides for all of it.
-    pub(super) fn close_seams(
-        &mut self,
-        vertices: &[Vec3],
-        triangles: &[[u32; 3]],
-        normals: &[Vec3],
-        near: impl Fn(Vec3, Real, &mut dyn FnMut(u32)),
-    ) {
-        for index in 0..triangles.len() {
+    pub(super) fn close_seams(&mut self, near: impl Fn(Vec3, Real, &mut dyn FnMut(u32))) {
+        let surface = self.surface;
+        for index in 0..surface.triangles.len() as u32 {
             for edge in 0..3 {
-                if self.triangles[index].kinds[edge] != MeshEdge::Boundary {
+                if self.bends[index as usize][edge as usize] != Bend::BOUNDARY {
                     continue;
                 }
-                let corner = |t: usize, i: usize| vertices[triangles[t][i % 3] as usize];
-                let (a, b) = (corner(index, edge), corner(index, edge + 1));
+                let (a, b) = (surface.corner(index, edge), surface.corner(index, edge + 1));
                 let (middle, along) = ((a + b) * 0.5, (b - a).normalize_or_zero());
                 let gap = SEAM_GAP * (b - a).length();
-                let side = (0, 0, index as u32, edge as u32);
                 let mut others = Vec::new();
                 near(middle, gap, &mut |other| {
                     // Away from the edge inside the other triangle, if that goes on from the middle.
-                    let across = normals[other as usize].cross(along).normalize_or_zero();
+                    let normal = surface.normals[other as usize];
+                    let across = normal.cross(along).normalize_or_zero();
                     let goes_on = |u: Vec3| {
                         (0..3).all(|i| {
-                            let start = corner(other as usize, i);
-                            let inward = normals[other as usize].cross(corner(other as usize, i + 1) - start);
+                            let start = surface.corner(other, i);
+                            let inward = normal.cross(surface.corner(other, i + 1) - start);
                             inward.dot(middle + u * (3.0 * gap) - start) >= -gap * inward.length()
                         })
                     };
-                    let plane = normals[other as usize].dot(middle - corner(other as usize, 0)).abs();
-                    if other != index as u32 && plane <= gap && across != Vec3::ZERO {
+                    let plane = normal.dot(middle - surface.corner(other, 0)).abs();
+                    if other != index && plane <= gap && across != Vec3::ZERO {
                         others.extend([across, -across].into_iter().filter(|u| goes_on(*u)).map(|u| (other, u)));
                     }
                 });
-                let own = self.own[index][edge];
+                let own = surface.inward(index, edge);
                 // What folds back onto the triangle itself is a second sheet, not its continuation.
                 let ahead = others.into_iter().filter(|(_, u)| u.dot(own) < 0.99);
-                self.join(&side, normals[index], own, ahead);
+                self.join(&Side { end: 0, triangle: index, edge }, own, ahead);
             }
         }
     }
 
-    /// Marks the corners in which edges end that are not flat. Call once all edges are known.
-    pub(super) fn mark_corners(&mut self) {
-        for triangle in &self.triangles {
-            for (edge, kind) in triangle.kinds.iter().enumerate() {
-                for corner in [triangle.corners[edge], triangle.corners[(edge + 1) % 3]] {
-                    self.sharp[corner as usize] |= matches!(kind, MeshEdge::Boundary | MeshEdge::Convex);
-                    self.bent[corner as usize] |= *kind != MeshEdge::Flat;
+    /// What is to be kept, in the order of the tree. Call once all edges are known.
+    pub(super) fn finish(mut self, order: &[u32]) -> Vec<Surroundings> {
+        for triangle in 0..self.bends.len() as u32 {
+            for edge in 0..3 {
+                let mark = match self.bends[triangle as usize][edge].kind() {
+                    MeshEdge::Flat => continue,
+                    MeshEdge::Concave => BENT,
+                    MeshEdge::Boundary | MeshEdge::Convex => BENT | SHARP,
+                };
+                for i in [edge, edge + 1] {
+                    let corner = self.welded_corner(triangle, i);
+                    self.corners[corner as usize] |= mark;
                 }
             }
         }
-        self.flatten_patches();
+        order.iter().map(|&id| self.surroundings(id)).collect()
+    }
+
+    fn surroundings(&mut self, id: u32) -> Surroundings {
+        let bends = self.bends[id as usize];
+        let mut bits = 0;
+        for (i, bend) in bends.iter().enumerate() {
+            let corner = self.corners[self.welded_corner(id, i) as usize];
+            let sharp = matches!(bend.kind(), MeshEdge::Boundary | MeshEdge::Convex);
+            bits |= u16::from(sharp) << i;
+            bits |= u16::from(bend.kind() == MeshEdge::Flat) << (3 + i);
+            bits |= u16::from(corner & SHARP != 0) << (6 + i);
+            bits |= u16::from(corner & BENT == 0) << (9 + i);
+        }
+        Surroundings { id, patch: self.patch(id), bends, bits }
     }
 
     fn patch(&mut self, triangle: u32) -> u32 {
@@ -200,26 +352,6 @@ impl Adjacency {
     fn join_patches(&mut self, a: u32, b: u32) {
         let (a, b) = (self.patch(a), self.patch(b));
         self.patches[a.max(b) as usize] = a.min(b);
-    }
-
-    fn flatten_patches(&mut self) {
-        for triangle in 0..self.patches.len() as u32 {
-            self.patches[triangle as usize] = self.patch(triangle);
-        }
-    }
-
-    fn link_corners(&mut self, vertices: usize, sides: &[Side]) {
-        let mut links: Vec<(u32, u32)> = sides.iter().flat_map(|s| [(s.0, s.1), (s.1, s.0)]).collect();
-        links.sort_unstable();
-        links.dedup();
-        self.first = vec![0; vertices + 1];
-        for link in &links {
-            self.first[link.0 as usize + 1] += 1;
-        }
-        for i in 0..vertices {
-            self.first[i + 1] += self.first[i];
-        }
-        self.ends = links.iter().map(|link| link.1).collect();
     }
 }
 
@@ -237,26 +369,25 @@ fn closing(neighbor: Vec3, normal: Vec3, own: Vec3) -> Real {
     }
 }
 
-/// Unit vector in the plane of a triangle from its edge inwards.
-fn inward(vertices: &[Vec3], triangle: &[u32; 3], normal: Vec3, edge: u32) -> Vec3 {
-    let corner = |i: u32| vertices[triangle[(i % 3) as usize] as usize].as_dvec3();
-    let along = corner(edge + 1) - corner(edge);
-    let across = normal.as_dvec3().cross(along);
-    (across / across.length()).as_vec3()
-}
-
 /// For each vertex the first one at the same position.
 fn weld(vertices: &[Vec3]) -> Vec<u32> {
+    const FREE: u32 = u32::MAX;
     // Adding zero makes −0 and +0 one position.
-    let key = |i: u32| vertices[i as usize] + Vec3::ZERO;
-    let order = |a: Vec3, b: Vec3| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)).then(a.z.total_cmp(&b.z));
-    let mut sorted: Vec<u32> = (0..vertices.len() as u32).collect();
-    sorted.sort_unstable_by(|&a, &b| order(key(a), key(b)).then(a.cmp(&b)));
-    let mut welded = vec![0; vertices.len()];
-    for group in sorted.chunk_by(|&a, &b| key(a) == key(b)) {
-        for &vertex in group {
-            welded[vertex as usize] = group[0];
+    let key = |i: u32| (vertices[i as usize] + Vec3::ZERO).to_array().map(Real::to_bits);
+    let mask = (2 * vertices.len()).next_power_of_two() - 1;
+    // A table of first vertices, tried from a place that the position gives.
+    let mut table = vec![FREE; mask + 1];
+    let mut first_at = |vertex: u32| {
+        let wanted = key(vertex);
+        let mixed = wanted.iter().fold(0_u64, |h, &bits| (h ^ u64::from(bits)).wrapping_mul(0x9e37_79b9_7f4a_7c15));
+        let mut place = (mixed >> 32) as usize & mask;
+        while table[place] != FREE && key(table[place]) != wanted {
+            place = (place + 1) & mask;
         }
-    }
-    welded
+        if table[place] == FREE {
+            table[place] = vertex;
+        }
+        table[place]
+    };
+    (0..vertices.len() as u32).map(&mut first_at).collect()
 }

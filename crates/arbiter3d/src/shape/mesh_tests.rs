@@ -26,11 +26,6 @@ fn soup(random: &mut Random, count: usize, sides: MeshSides) -> TriangleMesh {
     TriangleMesh::with_sides(vertices, triangles, sides).unwrap()
 }
 
-fn depth(mesh: &TriangleMesh, index: usize) -> usize {
-    let node = mesh.nodes()[index];
-    if node.count > 0 { 0 } else { 1 + depth(mesh, index + 1).max(depth(mesh, node.first as usize)) }
-}
-
 #[test]
 fn queries_and_rays_match_brute_force() {
     let mut random = Random(1);
@@ -48,7 +43,13 @@ fn queries_and_rays_match_brute_force() {
 
             let (origin, direction) = (random.vector() * 12.0, random.vector());
             let ray = Ray::new(origin, direction).unwrap();
-            let hits = (0..500).filter_map(|i| ray.hit(mesh.facet(i), sides)).filter(|h| h.distance <= 20.0);
+            let hits = (0..500).filter_map(|i| {
+                let (distance, back) = ray.hit(&mesh.corners(i), sides)?;
+                let normal = mesh.facet(i).normal();
+                assert_eq!(back, normal.dot(direction) > 0.0);
+                let normal = if back { -normal } else { normal };
+                (distance <= 20.0).then_some(MeshRayHit { distance, normal, triangle: mesh.surroundings(i).id })
+            });
             let nearest = hits.min_by(|a, b| (a.distance, a.triangle).partial_cmp(&(b.distance, b.triangle)).unwrap());
             assert_eq!(mesh.cast_ray(origin, direction, 20.0), nearest);
         }
@@ -56,10 +57,9 @@ fn queries_and_rays_match_brute_force() {
 }
 
 #[test]
-fn equal_centroids_stay_within_the_stack() {
+fn equal_centers_and_doubling_sizes_stay_within_the_stack() {
     let triangles = vec![[0, 1, 2]; 3000];
     let mesh = TriangleMesh::new(vec![Vec3::ZERO, Vec3::Z, Vec3::X], triangles).unwrap();
-    assert!(depth(&mesh, 0) <= 12, "halving gives log2(3000 / 4) levels");
     let mut count = 0;
     mesh.for_each_triangle(&mesh.local_aabb(), |_, _| count += 1);
     assert_eq!(count, 3000);
@@ -71,7 +71,11 @@ fn equal_centroids_stay_within_the_stack() {
     }
     let triangles = (0..100).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
     let mesh = TriangleMesh::new(vertices, triangles).unwrap();
-    assert!(depth(&mesh, 0) < 63);
+    let mut count = 0;
+    mesh.for_each_triangle(&mesh.local_aabb(), |_, _| count += 1);
+    assert_eq!(count, 100);
+    let down = mesh.cast_ray(Vec3::new(0.1, 1.0, 0.1), -Vec3::Y, 2.0).unwrap();
+    assert_eq!((down.distance, down.normal), (1.0, Vec3::Y));
 }
 
 /// Rays aimed exactly at the vertices, edge middles and along the diagonals of a floor never slip through.
@@ -127,19 +131,33 @@ fn bad_input_is_named() {
     assert!(TriangleMesh::new(tiny, vec![[0, 1, 2]]).is_ok(), "only the shape counts, not the size");
 }
 
+fn kinds(mesh: &TriangleMesh, index: usize) -> [MeshEdge; 3] {
+    [0, 1, 2].map(|edge| mesh.surroundings(index).bend(edge).kind())
+}
+
 /// Two triangles hinged about the z axis: the second one's outer corner is up, level or down. Unshared indices on purpose.
 #[test]
 fn edges_know_whether_they_bend() {
     for (height, kind) in [(0.0, MeshEdge::Flat), (0.5, MeshEdge::Concave), (-0.5, MeshEdge::Convex)] {
         let vertices = vec![Vec3::ZERO, Vec3::Z, Vec3::X, Vec3::ZERO, Vec3::new(-1.0, height, 0.0), Vec3::Z];
         let mesh = TriangleMesh::new(vertices, vec![[0, 1, 2], [3, 4, 5]]).unwrap();
-        let i = (0..2).find(|&i| mesh.facet(i).id == 0).unwrap();
-        assert_eq!(mesh.neighborhood(i).kinds, [kind, MeshEdge::Boundary, MeshEdge::Boundary]);
+        let i = (0..2).find(|&i| mesh.surroundings(i).id == 0).unwrap();
+        let around = mesh.surroundings(i);
+        assert_eq!(kinds(&mesh, i), [kind, MeshEdge::Boundary, MeshEdge::Boundary]);
         let expected = Vec3::new(-1.0, height, 0.0).normalize();
-        assert!((mesh.neighborhood(i).inward[0] - expected).length() < 1e-6);
-        assert_eq!(mesh.facet(i).sharp_edges & 1, u8::from(kind == MeshEdge::Convex));
-        assert_eq!(mesh.facet(0).patch == mesh.facet(1).patch, kind == MeshEdge::Flat);
-        assert_eq!(mesh.corner_ends(0).count(), 3);
+        assert!((around.bend(0).across(Vec3::Y, Vec3::X) - expected).length() < 1e-4);
+        assert_eq!(around.edge_is_sharp(0), kind == MeshEdge::Convex);
+        assert_eq!(around.edge_is_flat(0), kind == MeshEdge::Flat);
+        assert_eq!(around.patch == mesh.surroundings(1 - i).patch, kind == MeshEdge::Flat);
+        let mut ends = Vec::new();
+        mesh.each_end(Vec3::ZERO, |end| {
+            ends.push(end);
+            true
+        });
+        ends.dedup_by(|a, b| a == b);
+        for end in [Vec3::Z, Vec3::X, Vec3::new(-1.0, height, 0.0)] {
+            assert!(ends.contains(&end));
+        }
     }
 }
 
@@ -149,17 +167,11 @@ fn three_triangles_at_an_edge_close_the_front() {
     let vertices = vec![Vec3::ZERO, Vec3::Z, Vec3::X, -Vec3::X, Vec3::Y];
     let mesh = TriangleMesh::new(vertices, vec![[0, 1, 2], [1, 0, 3], [0, 1, 4]]).unwrap();
     for i in 0..3 {
-        let facet = mesh.facet(i);
-        let edge = (0..3)
-            .find(|&e| {
-                facet.corners[e].x == 0.0
-                    && facet.corners[(e + 1) % 3].x == 0.0
-                    && facet.corners[e].y == 0.0
-                    && facet.corners[(e + 1) % 3].y == 0.0
-            })
-            .unwrap();
-        if facet.id < 2 {
-            assert_eq!(mesh.neighborhood(i).kinds[edge], MeshEdge::Concave);
+        let corners = mesh.corners(i);
+        let on_seam = |e: usize| corners[e % 3].x == 0.0 && corners[e % 3].y == 0.0;
+        let edge = (0..3).find(|&e| on_seam(e) && on_seam(e + 1)).unwrap();
+        if mesh.surroundings(i).id < 2 {
+            assert_eq!(kinds(&mesh, i)[edge], MeshEdge::Concave);
         }
     }
 }
@@ -171,11 +183,37 @@ fn seams_without_shared_corners_are_closed() {
     let vertices = vec![at(0.0, 0.0), at(0.0, 2.0), at(2.0, 0.0), at(-1.0, 0.0), at(0.0, 1.3), at(-1.0, 2.0)];
     let mesh = TriangleMesh::new(vertices, vec![[0, 1, 2], [0, 3, 4], [4, 5, 1]]).unwrap();
     for i in 0..3 {
-        let facet = mesh.facet(i);
+        let corners = mesh.corners(i);
         for edge in 0..3 {
-            let seam = facet.corners[edge].x == 0.0 && facet.corners[(edge + 1) % 3].x == 0.0;
+            let seam = corners[edge].x == 0.0 && corners[(edge + 1) % 3].x == 0.0;
             let expected = if seam { MeshEdge::Flat } else { MeshEdge::Boundary };
-            assert_eq!(mesh.neighborhood(i).kinds[edge], expected, "triangle {} edge {edge}", facet.id);
+            assert_eq!(kinds(&mesh, i)[edge], expected, "triangle {} edge {edge}", mesh.surroundings(i).id);
         }
     }
+}
+
+/// A hinge at all angles: what is kept of the bend gives back the direction into the neighbour to a ten thousandth.
+#[test]
+fn bends_keep_the_direction_into_the_neighbour() {
+    for step in -1790..=1790 {
+        let angle = (step as f32 / 10.0).to_radians();
+        let expected = Vec3::new(-libm::cosf(angle), libm::sinf(angle), 0.0);
+        let vertices = vec![Vec3::ZERO, Vec3::Z, Vec3::X, expected];
+        let mesh = TriangleMesh::new(vertices, vec![[0, 1, 2], [0, 3, 1]]).unwrap();
+        let around = (0..2).map(|i| mesh.surroundings(i)).find(|around| around.id == 0).unwrap();
+        let across = around.bend(0).across(Vec3::Y, Vec3::X);
+        assert!((across - expected).length() < 1e-4, "{angle} {across}");
+        assert_eq!(around.bend(0).kind() == MeshEdge::Convex, step < 0, "{angle}");
+        assert_eq!(around.bend(0).kind() == MeshEdge::Concave, step > 0, "{angle}");
+    }
+}
+
+/// All that is held of a large mesh, beside the user's own lists: no more than 24 bytes a triangle.
+#[test]
+fn meshes_are_small() {
+    let mesh = bumpy_floor(128);
+    let held = mesh.surroundings.capacity() * size_of::<Surroundings>() + mesh.tree.bytes();
+    let triangles = mesh.triangles().len();
+    assert!(held <= 24 * triangles, "{held} bytes for {triangles} triangles");
+    assert_eq!(mesh.vertices.capacity(), mesh.vertices().len() + 1);
 }

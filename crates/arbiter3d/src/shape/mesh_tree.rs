@@ -1,130 +1,218 @@
-//! Bounding-volume tree over the triangles of a mesh: built once, flat, depth first.
+//! Bounding-volume tree over the triangles of a mesh: eight children a node, their boxes side by side so that all are
+//! tested at once.
 //!
-//! Top-down build: each range of triangles is cut where the surface-area heuristic `area · count` (left plus right) is least,
-//! centroids sorted into bins along each axis. Where the bins cannot cut (equal centroids) or the tree has become deep, the
-//! range is halved at its median instead, which bounds the depth: at most [`SAH_DEPTH`] levels by area, then at most 32 halvings.
-//! Source: Wald, "On fast Construction of SAH-based Bounding Volume Hierarchies", 2007.
+//! A walk asks each node which of its eight boxes overlap the wanted one and goes down lane by lane, so triangles come in
+//! ascending order; it is entered once with the machine's best lanes, and what looks at the leaves ([`Leaves`]) runs
+//! inside it. The build (see `mesh_tree_builder`) fills leaves with up to [`LEAF`] triangles of consecutive numbers.
 //!
-//! Invariants: the first child follows its parent, the second is `first`; leaves hold 1 to [`LEAF_SIZE`] triangles of
-//! consecutive numbers, numbered in the order in which the tree is walked.
+//! Invariants: lanes are filled from the first; those left over hold a box that overlaps nothing and that no ray enters.
+//! Source of the wide tree: Wald, Benthin, Boulos, "Getting Rid of Packets", 2008.
 
-use crate::math::{Aabb, Real, Vec3, max, max3, min, min3};
+use super::mesh_tree_builder::Builder;
+use crate::math::{Aabb, Real, Vec3};
+use crate::simd::{KernelOfEight, LaneVec3, Lanes, Number, Wide, run_eight};
 
-/// A node of the mesh's tree.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Children of a node.
+pub(super) const WIDTH: usize = 8;
+/// Triangles in a leaf at most.
+pub(crate) const LEAF: usize = 8;
+/// Nodes on the way to a leaf at most: a child either holds at most half of the triangles of its parent or came from seven
+/// cuts, of which at most 31 in a row are uneven.
+const MOST_LEVELS: usize = 48;
+
+/// A node of the tree: the boxes of its children, side by side.
+#[derive(Clone, Copy, Debug)]
 #[repr(C)]
-pub struct MeshNode {
-    /// Box around everything below.
-    pub aabb: Aabb,
-    /// First triangle of a leaf, or index of the second child (the first follows its parent).
-    pub first: u32,
-    /// Triangles in a leaf, zero for an inner node.
-    pub count: u32,
+pub(super) struct Node {
+    low: LaneVec3<Wide<WIDTH>>,
+    high: LaneVec3<Wide<WIDTH>>,
+    /// First triangle of a leaf, or number of the node.
+    first: [u32; WIDTH],
+    /// Triangles in a leaf; 0 for a node.
+    counts: [u8; WIDTH],
 }
 
-/// Triangles in a leaf at most.
-const LEAF_SIZE: usize = 4;
-/// Bins an axis.
-const BINS: usize = 16;
-/// Levels that may be cut by area; below them ranges are halved.
-const SAH_DEPTH: usize = 31;
-/// Entries of a walk's stack: one a level.
-const STACK: usize = 64;
+impl Node {
+    pub(super) const EMPTY: Self = Self {
+        low: LaneVec3 { x: Wide([Real::MAX; WIDTH]), y: Wide([Real::MAX; WIDTH]), z: Wide([Real::MAX; WIDTH]) },
+        high: LaneVec3 { x: Wide([-Real::MAX; WIDTH]), y: Wide([-Real::MAX; WIDTH]), z: Wide([-Real::MAX; WIDTH]) },
+        first: [0; WIDTH],
+        counts: [0; WIDTH],
+    };
+
+    /// Fills a lane; `count` is 0 for a node.
+    pub(super) fn set(&mut self, lane: usize, aabb: &Aabb, first: u32, count: usize) {
+        self.low.set::<WIDTH>(lane, aabb.min);
+        self.high.set::<WIDTH>(lane, aabb.max);
+        (self.first[lane], self.counts[lane]) = (first, count as u8);
+    }
+}
+
+/// What a walk does with the leaves it comes by, in ascending order of their triangles.
+pub(crate) trait Leaves {
+    /// Zero where a box (its centre and half its size) is of no interest after all; `overlapping` is positive for those that
+    /// overlap the box of the walk.
+    #[inline(always)]
+    fn keep<W: Lanes<WIDTH>>(&self, overlapping: W, _center: &LaneVec3<W>, _half: &LaneVec3<W>) -> W {
+        overlapping
+    }
+
+    /// A leaf with the triangles from `first` on.
+    fn leaf<W: Lanes<WIDTH>>(&mut self, first: usize, count: usize);
+}
 
 /// The tree: nodes alone; the triangles are its owner's.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct MeshTree {
-    nodes: Vec<MeshNode>,
+    nodes: Vec<Node>,
+    around: Aabb,
 }
 
 impl MeshTree {
     /// Builds the tree of some boxes, and the order in which their owners have to be stored.
-    pub(super) fn build(boxes: &[Aabb]) -> (Self, Vec<u32>) {
-        let mut builder = Builder {
-            boxes,
-            centers: boxes.iter().map(Aabb::center).collect(),
-            order: (0..boxes.len() as u32).collect(),
-            scratch: Vec::with_capacity(boxes.len()),
-            nodes: Vec::with_capacity(boxes.len()),
-        };
-        builder.node(0, boxes.len(), 0);
-        (Self { nodes: builder.nodes }, builder.order)
+    pub(super) fn build(boxes: impl Iterator<Item = Aabb>) -> (Self, Vec<u32>) {
+        let (nodes, around, order) = Builder::build(boxes);
+        (Self { nodes, around }, order)
     }
 
-    pub(super) fn nodes(&self) -> &[MeshNode] {
-        &self.nodes
+    pub(super) fn around(&self) -> Aabb {
+        self.around
+    }
+
+    #[cfg(test)]
+    pub(super) fn bytes(&self) -> usize {
+        self.nodes.capacity() * size_of::<Node>()
+    }
+
+    /// Shows the leaves whose boxes overlap the given one.
+    #[inline]
+    pub(super) fn walk(&self, aabb: &Aabb, leaves: &mut impl Leaves) {
+        run_eight(Walk { nodes: &self.nodes, aabb, leaves });
     }
 
     /// Calls `visit` with every stored triangle of every leaf that overlaps the box, in ascending order.
     #[inline]
-    pub(super) fn query(&self, aabb: &Aabb, mut visit: impl FnMut(usize)) {
-        let mut stack = [0_u32; STACK];
-        let mut top = 0;
-        let mut index = 0;
-        loop {
-            let node = &self.nodes[index];
-            if node.aabb.overlaps(aabb) {
-                if node.count == 0 {
-                    stack[top] = node.first;
-                    top += 1;
-                    index += 1;
-                    continue;
-                }
-                for triangle in node.first..node.first + node.count {
-                    visit(triangle as usize);
-                }
-            }
-            if top == 0 {
-                return;
-            }
-            top -= 1;
-            index = stack[top] as usize;
-        }
+    pub(super) fn query(&self, aabb: &Aabb, visit: impl FnMut(usize)) {
+        self.walk(aabb, &mut Each(visit));
     }
 
     /// Walks the leaves along a ray, near ones first. `visit` gets a stored triangle and returns how far (in multiples of
     /// the direction) is still of interest.
     pub(super) fn cast(&self, ray: &Slabs, limit: Real, mut visit: impl FnMut(usize) -> Real) {
         let mut limit = limit;
-        let mut stack = [(0_u32, 0.0 as Real); STACK];
-        let mut top = 0;
-        let Some(mut entry) = ray.entry(&self.nodes[0].aabb, limit) else { return };
-        let mut index = 0_usize;
-        loop {
-            let node = &self.nodes[index];
-            if node.count > 0 && entry <= limit {
-                for triangle in node.first..node.first + node.count {
+        // Children that the ray enters (eight times the node's number plus the lane), and where it does.
+        let mut stack = [(0_u32, 0.0 as Real); MOST_LEVELS * (WIDTH - 1) + 1];
+        let mut top = self.enter(0, ray, limit, &mut stack, 0);
+        while top > 0 {
+            top -= 1;
+            let (child, entry) = stack[top];
+            if entry > limit {
+                continue;
+            }
+            let (node, lane) = (&self.nodes[child as usize / WIDTH], child as usize % WIDTH);
+            if node.counts[lane] == 0 {
+                top = self.enter(node.first[lane], ray, limit, &mut stack, top);
+            } else {
+                for triangle in node.first[lane]..node.first[lane] + u32::from(node.counts[lane]) {
                     limit = visit(triangle as usize);
                 }
-            } else if entry <= limit {
-                let (near, far) = self.children(index, ray, limit);
-                if let Some(far) = far {
-                    stack[top] = far;
-                    top += 1;
-                }
-                if let Some((child, at)) = near {
-                    (index, entry) = (child as usize, at);
-                    continue;
-                }
             }
-            if top == 0 {
-                return;
-            }
-            top -= 1;
-            (index, entry) = (stack[top].0 as usize, stack[top].1);
         }
     }
 
-    /// The children that a ray enters, with where it does, the nearer first.
-    #[expect(clippy::type_complexity, reason = "two optional (node, entry) pairs: a name would say no more")]
-    fn children(&self, index: usize, ray: &Slabs, limit: Real) -> (Option<(u32, Real)>, Option<(u32, Real)>) {
-        let enter = |child: u32| ray.entry(&self.nodes[child as usize].aabb, limit).map(|at| (child, at));
-        match (enter(index as u32 + 1), enter(self.nodes[index].first)) {
-            (Some(a), Some(b)) if b.1 < a.1 => (Some(b), Some(a)),
-            (None, b) => (b, None),
-            pair => pair,
+    /// Puts the children that a ray enters on the stack, the nearest last. Returns the new height of the stack.
+    fn enter(&self, node: u32, ray: &Slabs, limit: Real, stack: &mut [(u32, Real)], top: usize) -> usize {
+        let mut entries = [0.0; WIDTH];
+        run_eight(Entries { node: &self.nodes[node as usize], ray, limit, entries: &mut entries });
+        let mut end = top;
+        for (lane, &entry) in entries.iter().enumerate() {
+            if entry == Real::MAX {
+                continue;
+            }
+            let mut place = end;
+            while place > top && stack[place - 1].1 < entry {
+                stack[place] = stack[place - 1];
+                place -= 1;
+            }
+            stack[place] = (node * WIDTH as u32 + lane as u32, entry);
+            end += 1;
+        }
+        end
+    }
+}
+
+/// Calls a function with every triangle.
+struct Each<F>(F);
+
+impl<F: FnMut(usize)> Leaves for Each<F> {
+    #[inline(always)]
+    fn leaf<W: Lanes<WIDTH>>(&mut self, first: usize, count: usize) {
+        for triangle in first..first + count {
+            (self.0)(triangle);
         }
     }
+}
+
+struct Walk<'a, V> {
+    nodes: &'a [Node],
+    aabb: &'a Aabb,
+    leaves: &'a mut V,
+}
+
+impl<V: Leaves> KernelOfEight for Walk<'_, V> {
+    #[inline(always)]
+    fn run<W: Lanes<WIDTH>>(self) {
+        let (low, high) = (LaneVec3::<W>::splat(self.aabb.min), LaneVec3::<W>::splat(self.aabb.max));
+        // Nodes on the way and the lanes of each that are still to be visited.
+        let mut stack = [(0_u32, 0_u32); MOST_LEVELS];
+        let mut depth = 0;
+        let mut index = 0;
+        let mut lanes = overlapping(&self.nodes[0], &low, &high, self.leaves);
+        loop {
+            let node = &self.nodes[index as usize];
+            if lanes == 0 {
+                if depth == 0 {
+                    return;
+                }
+                depth -= 1;
+                (index, lanes) = stack[depth];
+                continue;
+            }
+            let lane = lanes.trailing_zeros() as usize % WIDTH;
+            lanes &= lanes - 1;
+            if node.counts[lane] > 0 {
+                self.leaves.leaf::<W>(node.first[lane] as usize, node.counts[lane] as usize);
+                continue;
+            }
+            if lanes != 0 {
+                stack[depth] = (index, lanes);
+                depth += 1;
+            }
+            index = node.first[lane];
+            lanes = overlapping(&self.nodes[index as usize], &low, &high, self.leaves);
+        }
+    }
+}
+
+/// The lanes whose boxes overlap the given one, a bit each.
+#[inline(always)]
+fn overlapping<W: Lanes<WIDTH>>(node: &Node, low: &LaneVec3<W>, high: &LaneVec3<W>, leaves: &impl Leaves) -> u32 {
+    let (from, to): (LaneVec3<W>, LaneVec3<W>) = (node.low.to_lanes(), node.high.to_lanes());
+    let found = keep_overlapping(W::splat(1.0), [from.x, to.x], [low.x, high.x]);
+    let found = keep_overlapping(found, [from.y, to.y], [low.y, high.y]);
+    let found = keep_overlapping(found, [from.z, to.z], [low.z, high.z]);
+    if found.positive() == 0 {
+        return 0;
+    }
+    let half = W::splat(0.5);
+    let center = LaneVec3 { x: (from.x + to.x) * half, y: (from.y + to.y) * half, z: (from.z + to.z) * half };
+    leaves.keep(found, &center, &(to - center)).positive()
+}
+
+#[inline(always)]
+fn keep_overlapping<W: Number>(found: W, [low, high]: [W; 2], [wanted_low, wanted_high]: [W; 2]) -> W {
+    let found = wanted_high.if_at_least(low, found, W::ZERO);
+    high.if_at_least(wanted_low, found, W::ZERO)
 }
 
 /// A ray made ready for boxes.
@@ -139,161 +227,39 @@ impl Slabs {
         let inverse = |d: Real| if d == 0.0 { 0.0 } else { 1.0 / d };
         Self { origin: origin.to_array(), inverse: direction.to_array().map(inverse) }
     }
+}
 
-    /// Where the ray enters the box, if it does before `limit`. Grown by a few rounding errors, so that no box is missed
-    /// whose triangle the exact test would hit.
-    fn entry(&self, aabb: &Aabb, limit: Real) -> Option<Real> {
+/// Where a ray enters the boxes of a node before `limit`; [`Real::MAX`] for those that it misses. Boxes are grown by a
+/// few rounding errors, so that none is missed whose triangle the exact test would hit.
+struct Entries<'a> {
+    node: &'a Node,
+    ray: &'a Slabs,
+    limit: Real,
+    entries: &'a mut [Real; WIDTH],
+}
+
+impl KernelOfEight for Entries<'_> {
+    #[inline(always)]
+    fn run<W: Lanes<WIDTH>>(self) {
         const GROW: Real = 1.0 + 1e-6;
-        let (low, high) = (aabb.min.to_array(), aabb.max.to_array());
-        let (mut enter, mut leave) = (0.0, limit);
+        let (low, high): (LaneVec3<W>, LaneVec3<W>) = (self.node.low.to_lanes(), self.node.high.to_lanes());
+        let (low, high) = (low.columns(), high.columns());
+        let none = W::splat(Real::MAX);
+        let (mut enter, mut leave) = (W::ZERO, W::splat(self.limit));
         for axis in 0..3 {
-            let (a, b) = (low[axis] - self.origin[axis], high[axis] - self.origin[axis]);
-            let slack = 1e-6 * max(max(low[axis].abs(), high[axis].abs()), self.origin[axis].abs());
-            if self.inverse[axis] == 0.0 {
-                if a > slack || b < -slack {
-                    return None;
-                }
+            let origin = W::splat(self.ray.origin[axis]);
+            let slack = W::splat(1e-6) * low[axis].abs().max(high[axis].abs()).max(origin.abs());
+            let (a, b) = (low[axis] - origin - slack, high[axis] - origin + slack);
+            let inverse = self.ray.inverse[axis];
+            if inverse == 0.0 {
+                enter = a.if_positive(none, enter);
+                enter = b.if_at_least(W::ZERO, enter, none);
                 continue;
             }
-            let (t1, t2) = ((a - slack) * self.inverse[axis], (b + slack) * self.inverse[axis]);
-            enter = max(enter, min(t1, t2) / GROW);
-            leave = min(leave, max(t1, t2) * GROW);
+            let (near, far) = if inverse > 0.0 { (a, b) } else { (b, a) };
+            enter = (near * W::splat(inverse / GROW)).max(enter);
+            leave = (far * W::splat(inverse * GROW)).min(leave);
         }
-        (enter <= leave).then_some(enter)
-    }
-}
-
-struct Builder<'a> {
-    boxes: &'a [Aabb],
-    centers: Vec<Vec3>,
-    order: Vec<u32>,
-    scratch: Vec<u32>,
-    nodes: Vec<MeshNode>,
-}
-
-/// Where to cut a range.
-struct Cut {
-    axis: usize,
-    low: Real,
-    scale: Real,
-    /// Bins up to this one go left.
-    last: usize,
-}
-
-impl Cut {
-    fn bin(&self, center: Vec3) -> usize {
-        (((center[self.axis] - self.low) * self.scale) as usize).min(BINS - 1)
-    }
-}
-
-impl Builder<'_> {
-    fn node(&mut self, start: usize, end: usize, depth: usize) {
-        let index = self.nodes.len();
-        let aabb = self.order[start..end].iter().fold(Aabb::EMPTY, |b, &t| b.union(&self.boxes[t as usize]));
-        self.nodes.push(MeshNode { aabb, first: start as u32, count: (end - start) as u32 });
-        if end - start <= LEAF_SIZE {
-            return;
-        }
-        let cut = if depth < SAH_DEPTH { self.best_cut(start, end) } else { None };
-        let middle = match cut {
-            Some(cut) => self.partition(start, end, &cut),
-            None => self.halve(start, end),
-        };
-        self.node(start, middle, depth + 1);
-        self.nodes[index].first = self.nodes.len() as u32;
-        self.nodes[index].count = 0;
-        self.node(middle, end, depth + 1);
-    }
-
-    fn center_bounds(&self, start: usize, end: usize) -> Aabb {
-        self.order[start..end].iter().fold(Aabb::EMPTY, |b, &t| {
-            let c = self.centers[t as usize];
-            Aabb::new(min3(b.min, c), max3(b.max, c))
-        })
-    }
-
-    /// The cut with the least `area · count`; `None` where all centroids are equal (or too close to tell apart).
-    fn best_cut(&self, start: usize, end: usize) -> Option<Cut> {
-        let bounds = self.center_bounds(start, end);
-        let mut best: Option<Cut> = None;
-        let mut best_cost = Real::MAX;
-        for axis in 0..3 {
-            let extent = bounds.max[axis] - bounds.min[axis];
-            let scale = BINS as Real / extent;
-            if !(extent > 0.0 && scale.is_finite()) {
-                continue;
-            }
-            let cut = Cut { axis, low: bounds.min[axis], scale, last: 0 };
-            if let Some((last, cost)) = self.cheapest_bin(start, end, &cut)
-                && cost < best_cost
-            {
-                best_cost = cost;
-                best = Some(Cut { last, ..cut });
-            }
-        }
-        best
-    }
-
-    /// The last bin on the left of the cheapest cut of one axis, and that cut's cost.
-    fn cheapest_bin(&self, start: usize, end: usize, cut: &Cut) -> Option<(usize, Real)> {
-        let mut boxes = [Aabb::EMPTY; BINS];
-        let mut counts = [0_usize; BINS];
-        for &triangle in &self.order[start..end] {
-            let bin = cut.bin(self.centers[triangle as usize]);
-            boxes[bin] = boxes[bin].union(&self.boxes[triangle as usize]);
-            counts[bin] += 1;
-        }
-        // Costs of everything right of each bin, from the far end.
-        let mut right = [0.0; BINS];
-        let (mut aabb, mut count) = (Aabb::EMPTY, 0);
-        for bin in (1..BINS).rev() {
-            aabb = aabb.union(&boxes[bin]);
-            count += counts[bin];
-            right[bin - 1] = if count == 0 { Real::MAX } else { aabb.area() * count as Real };
-        }
-        let mut best = None;
-        let mut best_cost = Real::MAX;
-        (aabb, count) = (Aabb::EMPTY, 0);
-        for bin in 0..BINS - 1 {
-            aabb = aabb.union(&boxes[bin]);
-            count += counts[bin];
-            if count == 0 || right[bin] == Real::MAX {
-                continue;
-            }
-            let cost = aabb.area() * count as Real + right[bin];
-            if cost < best_cost {
-                best_cost = cost;
-                best = Some((bin, cost));
-            }
-        }
-        best
-    }
-
-    /// Sorts a range into left and right of a cut, keeping the order within each.
-    fn partition(&mut self, start: usize, end: usize, cut: &Cut) -> usize {
-        self.scratch.clear();
-        let mut middle = start;
-        for i in start..end {
-            let triangle = self.order[i];
-            if cut.bin(self.centers[triangle as usize]) <= cut.last {
-                self.order[middle] = triangle;
-                middle += 1;
-            } else {
-                self.scratch.push(triangle);
-            }
-        }
-        self.order[middle..end].copy_from_slice(&self.scratch);
-        middle
-    }
-
-    /// Halves a range along its longest axis.
-    fn halve(&mut self, start: usize, end: usize) -> usize {
-        let bounds = self.center_bounds(start, end);
-        let size = bounds.max - bounds.min;
-        let axis = if size.x >= size.y && size.x >= size.z { 0 } else { 1 + usize::from(size.z > size.y) };
-        let centers = &self.centers;
-        self.order[start..end]
-            .sort_by(|&a, &b| centers[a as usize][axis].total_cmp(&centers[b as usize][axis]).then(a.cmp(&b)));
-        start + (end - start) / 2
+        *self.entries = leave.if_at_least(enter, enter, none).to_array();
     }
 }

@@ -13,6 +13,7 @@ mod mass;
 mod mesh;
 mod mesh_edges;
 mod mesh_tree;
+mod mesh_tree_builder;
 mod sphere;
 
 pub use capsule::Capsule;
@@ -20,8 +21,10 @@ pub use cuboid::Cuboid;
 pub use hull::{ConvexHull, HalfEdge, Plane};
 pub(crate) use hull_features::{BorderEdge, CornerGroup, FaceGroup, LANES};
 pub use mass::MassProperties;
-pub(crate) use mesh::{Facet, OCTET, Octet};
-pub use mesh::{MeshEdge, MeshNode, MeshRayHit, MeshSides, TriangleMesh};
+pub(crate) use mesh::Facet;
+pub use mesh::{MeshEdge, MeshRayHit, MeshSides, TriangleMesh};
+pub(crate) use mesh_edges::Surroundings;
+pub(crate) use mesh_tree::{LEAF, Leaves};
 pub use sphere::Sphere;
 
 use crate::math::{Aabb, Pose, Real, Vec3};
@@ -220,15 +223,20 @@ impl Shape {
     /// Distance of the farthest point of the shape from the origin of its frame, metres; for meshes an upper bound.
     #[must_use]
     pub fn reach(&self) -> Real {
+        self.reach_from(Vec3::ZERO)
+    }
+
+    /// Distance of the farthest point of the shape from a point of its frame; for meshes an upper bound.
+    pub(crate) fn reach_from(&self, point: Vec3) -> Real {
         match self {
-            Self::Sphere(s) => s.radius(),
-            Self::Capsule(s) => s.half_length() + s.radius(),
-            Self::Cuboid(s) => s.half_extents().length(),
-            Self::Hull(s) => s.vertices().iter().fold(0.0, |far, v| crate::math::max(v.length(), far)),
-            Self::Mesh(s) => {
-                let bounds = s.local_aabb();
-                crate::math::max3(bounds.max.abs(), bounds.min.abs()).length()
+            Self::Sphere(s) => point.length() + s.radius(),
+            Self::Capsule(s) => {
+                let along = Vec3::new(point.x, point.y.abs() + s.half_length(), point.z);
+                along.length() + s.radius()
             }
+            Self::Cuboid(s) => (crate::math::abs3(point) + s.half_extents()).length(),
+            Self::Hull(s) => s.vertices().iter().fold(0.0, |far, v| crate::math::max((*v - point).length(), far)),
+            Self::Mesh(s) => s.local_aabb().farthest_from(point).length(),
         }
     }
 

@@ -6,7 +6,7 @@ use super::events::{BeginListener, EndListener};
 use crate::arbiter::{EndReason, NONE};
 use crate::error::{Error, finite, finite_vec, in_range, unit_rotation};
 use crate::id::{BodyId, ShapeId};
-use crate::math::{Mat3, Pose, Quat, Real, SymmetricMat3, Vec3};
+use crate::math::{Mat3, Pose, Quat, Real, SymmetricMat3, Vec3, abs3, max3, min};
 use crate::shape::MassProperties;
 use crate::solver::BodyMotion;
 
@@ -39,6 +39,8 @@ pub(crate) struct Body {
     /// Smallest ball inside its shapes, and the farthest a point of it is from the centre of mass.
     pub inner_radius: Real,
     pub reach: Real,
+    /// Half the size of the smallest box about the centre of mass that holds its shapes, in its axes.
+    pub extents: Vec3,
     pub shapes: Vec<ShapeId>,
     /// Places of the shapes.
     pub shape_slots: Vec<u32>,
@@ -48,6 +50,20 @@ pub(crate) struct Body {
 }
 
 impl Body {
+    /// Speed of the fastest point of a body that turns about its centre of mass, at most; `spin` (rad/s) in the body's axes.
+    ///
+    /// A long body that rolls about its own axis is slow, one that turns end over end is fast.
+    #[inline(always)]
+    pub fn surface_speed(&self, spin: Vec3) -> Real {
+        let (spin, half) = (abs3(spin), self.extents);
+        let fastest = Vec3::new(
+            spin.y * half.z + spin.z * half.y,
+            spin.z * half.x + spin.x * half.z,
+            spin.x * half.y + spin.y * half.x,
+        );
+        min(fastest.length(), spin.length() * self.reach)
+    }
+
     pub fn is_dynamic(&self) -> bool {
         self.kind == BodyKind::Dynamic
     }
@@ -74,6 +90,7 @@ impl Body {
             island: NONE,
             inner_radius: 0.0,
             reach: 0.0,
+            extents: Vec3::ZERO,
             shapes: Vec::new(),
             shape_slots: Vec::new(),
             first_pair: NONE,
@@ -633,17 +650,18 @@ impl World {
     }
 
     fn refresh_reach(&mut self, index: u32) {
-        let (mut inner, mut reach) = (Real::MAX, 0.0);
+        let (mut inner, mut reach, mut extents) = (Real::MAX, 0.0, Vec3::ZERO);
         let body = &self.bodies[index as usize];
         for &slot in &body.shape_slots {
             let shape = &self.shapes[slot as usize];
             inner = crate::math::min(shape.geometry.inner_radius(), inner);
-            let center = (shape.pose.position - body.mass.center).length();
-            reach = crate::math::max(center + shape.geometry.reach(), reach);
+            let center_of_mass = shape.from_center.inverse().position;
+            reach = crate::math::max(shape.geometry.reach_from(center_of_mass), reach);
+            extents = max3(shape.geometry.aabb(&shape.from_center).farthest_from(Vec3::ZERO), extents);
         }
         let body = &mut self.bodies[index as usize];
         body.inner_radius = if body.shape_slots.is_empty() { 0.0 } else { inner };
-        body.reach = reach;
+        (body.reach, body.extents) = (reach, extents);
     }
 
     /// Copies kind, mass and pose of a body into the solver's records.

@@ -91,15 +91,16 @@ impl World {
         let bulge = mover.bulge();
         mesh.for_each_facet(&mover.core_box(near), |index| {
             let facet = mesh.facet(index);
-            let heights = mover.heights(facet.normal, facet.corners[0]);
+            let (corners, normal) = (facet.corners(), facet.normal());
+            let heights = mover.heights(normal, corners[0]);
             let (in_front, comes) = (heights[0] >= 0.0, heights[1] < heights[0]);
             if mesh.sides() == MeshSides::One && !(in_front && comes) {
                 return;
             }
             let side = if in_front { 1.0 } else { -1.0 };
-            let lowest = mover.lowest_over(facet.normal * side, heights.map(|height| height * side)) - bulge;
+            let lowest = mover.lowest_over(normal * side, heights.map(|height| height * side)) - bulge;
             if lowest <= near
-                && let Some(t) = self.impact(&Support::Triangle(facet.corners), mover)
+                && let Some(t) = self.impact(&Support::Triangle(corners), mover)
                 && first.is_none_or(|earliest| t < earliest)
             {
                 first = Some(t);

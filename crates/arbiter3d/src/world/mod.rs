@@ -274,6 +274,7 @@ impl World {
             storage::push(&mut self.bodies, Body::new(self.tag.wrapping_add(1)));
             self.solver_bodies.push();
             self.sleeping.reserve(self.bodies.len());
+            crate::storage::reserve(&mut self.wake_scratch, self.bodies.len());
             (self.bodies.len() - 1) as u32
         };
         let body = &mut self.bodies[index as usize];

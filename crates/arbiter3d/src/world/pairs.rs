@@ -7,6 +7,7 @@
 
 use super::World;
 use super::definition::BodyKind;
+use super::shapes::ShapeSlot;
 use crate::arbiter::{EndReason, NONE};
 use crate::math::{Pose, Real, Rotation, Vec3, max, min};
 use crate::narrow_phase::PairCache;
@@ -35,6 +36,10 @@ pub(crate) struct Pair {
     /// Whether `manifold_pose` holds: cleared by teleports and edits.
     pub has_manifold: bool,
     pub shapes: [u32; 2],
+    /// Middle of the smaller shape when the manifold was made, from the centre of body 2 in the axes of body 1.
+    ///
+    /// How far the pair has moved is measured there: a long body that rolls or turns elsewhere does not count.
+    manifold_middle: Vec3,
     /// Inner radius of the smaller shape, metres.
     pub size: Real,
     /// How far a pair without contact may turn (sine of half the angle) until its shapes are looked at again.
@@ -52,7 +57,7 @@ const REUSE_TRANSLATION: Real = 0.02;
 /// How far a pair may turn (sine of half the angle) before its manifold is made anew: 1.4°.
 pub(super) const REUSE_ROTATION: Real = 0.0125;
 
-/// The same for long bodies, in shares of the smaller shape's inner radius over the body's reach.
+/// The same for long shapes, in shares of the smaller shape's inner radius over its reach.
 const REUSE_REACH: Real = 0.08;
 
 impl Pair {
@@ -62,6 +67,29 @@ impl Pair {
         const { assert!(std::mem::offset_of!(Self, bodies) + size_of::<u32>() == size_of::<[Quad; 3]>()) };
         // SAFETY: `repr(C)`; eleven floats, and the place of a body, whose bits are those of some float.
         unsafe { &*std::ptr::from_ref(self).cast() }
+    }
+
+    /// The middle of the smaller shape and [`Pair::size`].
+    #[inline(always)]
+    pub fn middle_quad(&self) -> &[Quad; 1] {
+        const {
+            assert!(
+                std::mem::offset_of!(Self, manifold_middle) + size_of::<Vec3>() == std::mem::offset_of!(Self, size)
+            );
+        };
+        // SAFETY: `repr(C)`; four floats.
+        unsafe { &*std::ptr::from_ref(&self.manifold_middle).cast() }
+    }
+
+    /// Notes how the bodies stand for which a manifold is made: `between` is the centre frame of body 2 seen from that of
+    /// body 1, `rotation` how body 1 is turned.
+    pub fn note_manifold(&mut self, between: &Pose, rotation: Rotation, shapes: [&ShapeSlot; 2]) {
+        (self.manifold_pose, self.manifold_rotation) = (*between, rotation);
+        self.manifold_middle = if shapes[0].reach < shapes[1].reach {
+            shapes[0].middle - between.position
+        } else {
+            between.rotation.rotate(shapes[1].middle)
+        };
     }
 
     /// How far (metres, sine of half the angle) the bodies may move against each other before their shapes are looked at
@@ -75,7 +103,7 @@ impl Pair {
         if self.arbiter == NONE {
             (0.25 * speculative_distance, self.apart_rotation)
         } else {
-            // A small part far out on a long body moves farther than its own size by turning: `1 / reach` is known from
+            // The end of a long shape moves farther than its own thickness by turning: `1 / reach` is known from
             // `apart_rotation`.
             let by_reach = REUSE_REACH * self.size * (8.0 * self.apart_rotation / speculative_distance);
             (REUSE_TRANSLATION * self.size, min(REUSE_ROTATION, by_reach))
@@ -167,7 +195,7 @@ impl World {
         let smaller_first = self.shapes[a as usize].id < self.shapes[b as usize].id;
         let shapes = if smaller_first { [a, b] } else { [b, a] };
         let bodies = shapes.map(|slot| self.shapes[slot as usize].body);
-        let reach = |side: usize| self.bodies[bodies[side] as usize].reach;
+        let reach = |side: usize| self.shapes[shapes[side] as usize].reach;
         let pair = Pair {
             shapes,
             bodies,
@@ -180,8 +208,9 @@ impl World {
             has_manifold: false,
             manifold_pose: Pose::IDENTITY,
             manifold_rotation: Rotation::IDENTITY,
+            manifold_middle: Vec3::ZERO,
             size: self.smaller_radius(shapes),
-            apart_rotation: self.scaled.speculative_distance / (8.0 * max(reach(0), reach(1))),
+            apart_rotation: self.scaled.speculative_distance / (8.0 * min(reach(0), reach(1))),
             cache: PairCache::default(),
             next: [NONE; 2],
             previous: [NONE; 2],

@@ -23,6 +23,10 @@ pub(crate) struct ShapeSlot {
     pub from_center: Pose,
     /// Whether that is right at it, with the body's axes.
     pub centered: bool,
+    /// Middle of the shape's box, seen from the body's centre of mass in the body's axes.
+    pub middle: Vec3,
+    /// Distance of the farthest point of the shape from that middle.
+    pub reach: Real,
     pub sensor: bool,
     /// Where the shape's frame sits on the body.
     pub pose: Pose,
@@ -37,6 +41,7 @@ impl ShapeSlot {
     pub fn set_center(&mut self, center: Vec3) {
         self.from_center = Pose::new(self.pose.position - center, self.pose.rotation);
         self.centered = self.from_center == Pose::IDENTITY;
+        self.middle = self.from_center.transform_point(self.geometry.local_aabb().center());
     }
 }
 
@@ -236,6 +241,8 @@ impl World {
             pose: Pose::new(definition.position, rotation),
             from_center: Pose::IDENTITY, // `update_mass` tells
             centered: false,
+            middle: Vec3::ZERO,
+            reach: definition.shape.reach_from(definition.shape.local_aabb().center()),
             geometry: definition.shape.clone(),
             density: definition.density,
             material: definition.material,

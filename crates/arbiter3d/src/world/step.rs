@@ -548,7 +548,7 @@ impl FinalizeContext<'_> {
         }
         body.pose.rotation = mass.rotation;
         body.pose.position = center - rotation * body.mass.center;
-        let speed = state.linear_velocity.length() + state.angular_velocity.length() * body.reach;
+        let speed = state.linear_velocity.length() + body.surface_speed(rotation.transpose() * state.angular_velocity);
         let rests =
             if motion.kinematic > 0.0 { speed == 0.0 } else { body.can_sleep && speed < self.settings.sleep_speed };
         body.sleep_time = if rests { body.sleep_time + self.dt } else { 0.0 };
@@ -557,9 +557,11 @@ impl FinalizeContext<'_> {
         if fast && traveled > 0.5 * body.inner_radius && self.meets_static(body, center, state.translation) {
             news.push(BodyNews::Fast(index));
         }
-        let displacement = state.linear_velocity * self.dt;
         for &slot in &body.shape_slots {
-            self.update_box(slot, body, displacement, left);
+            let shape = &self.shapes[slot as usize];
+            let lever = if shape.centered { Vec3::ZERO } else { rotation * shape.middle };
+            let velocity = state.linear_velocity + state.angular_velocity.cross(lever);
+            self.update_box(slot, body, velocity * self.dt, left);
         }
     }
 

@@ -11,7 +11,7 @@ use super::contacts::{FrameRecords, PairFrame, Places, WideFrame, turn_levers, u
 use super::{Begin, CollideContext, News};
 use crate::arbiter::{Arbiter, ArbiterKey, ContactData, NONE, TANGENT_VELOCITY_OVERRIDDEN};
 use crate::math::{Pose, Real, Rotation, Vec3, max, min};
-use crate::narrow_phase::{CuboidLanes, CuboidPair, Manifold, NearCuboids, WideManifold, collide};
+use crate::narrow_phase::{CuboidLanes, CuboidPair, Manifold, NearCuboids, WideManifold, collide_on};
 use crate::parallel::{BlockList, SharedSlice};
 use crate::shape::Shape;
 use crate::simd::{Kernel, LanePose, LaneRotation, LaneVec3, Lanes, prefetch};
@@ -208,14 +208,14 @@ impl<W: Lanes<L>, const L: usize> BlockKernel<'_, W, L> {
     fn test_reuse(&self, chunk: &[u32]) -> ReuseTest<W> {
         let (context, none) = (self.context, NO_MASS.quads());
         let (mut masses1, mut masses2) = ([none; L], [none; L]);
-        let mut old = [&[[0.0; 4]; 3]; L];
+        let (mut old, mut middles) = ([&[[0.0; 4]; 3]; L], [&[[0.0; 4]]; L]);
         let (mut distance, mut rotation) = ([0.0; L], [0.0; L]);
         let (mut keepable, mut conveyors) = (0, 0);
         for (lane, &index) in chunk.iter().enumerate().take(L) {
             let pair = self.pairs.shared(index);
             masses1[lane] = context.solver.masses[pair.bodies[0] as usize].quads();
             masses2[lane] = context.solver.masses[pair.bodies[1] as usize].quads();
-            old[lane] = pair.quads();
+            (old[lane], middles[lane]) = (pair.quads(), pair.middle_quad());
             (distance[lane], rotation[lane]) = pair.reuse_limits(context.settings.speculative_distance);
             let holds = pair.has_manifold
                 && (pair.arbiter != NONE
@@ -230,8 +230,10 @@ impl<W: Lanes<L>, const L: usize> BlockKernel<'_, W, L> {
         let [ry, rz, rw, _] = W::load_quad(&old, 2);
         let old_between = LaneRotation { vector: LaneVec3 { x: qx, y: qy, z: qz }, w: qw };
         let old_rotation = LaneRotation { vector: LaneVec3 { x: rx, y: ry, z: rz }, w: rw };
-        let moved = between.position - LaneVec3 { x: px, y: py, z: pz };
-        let turned = old_between.conjugate().mul(&between.rotation).vector;
+        let [mx, my, mz, _] = W::load_quad(&middles, 0);
+        let turned = between.rotation.mul(&old_between.conjugate()).vector;
+        let swung = turned.cross(&LaneVec3 { x: mx, y: my, z: mz });
+        let moved = between.position - LaneVec3 { x: px, y: py, z: pz } + (swung + swung);
         let along = old_rotation.conjugate().mul(&center1.rotation).vector;
         let (distance, rotation) = (W::from_array(distance), W::from_array(rotation));
         let (distance, rotation, one) = (distance * distance, rotation * rotation, W::splat(1.0));
@@ -347,8 +349,9 @@ impl<W: Lanes<L>, const L: usize> BlockKernel<'_, W, L> {
         let pair = self.pairs.pair(fresh.pair);
         let [s1, s2] = pair.shapes.map(|slot| &context.shapes[slot as usize]);
         let relative = shapes_relative(&fresh.between, s1, s2);
-        let mut manifold = Manifold::EMPTY;
-        collide(&s1.geometry, &s2.geometry, &relative, context.margin(pair), &mut pair.cache, &mut manifold);
+        let (mut manifold, margin) = (Manifold::EMPTY, context.margin(pair));
+        let kept = (&mut pair.cache, &mut manifold);
+        collide_on(context.level, (&s1.geometry, &s2.geometry), &relative, margin, kept);
         if !context.filters.passes_contact(pair, (context.shapes, context.bodies), &mut manifold) {
             manifold.clear();
         }
@@ -446,8 +449,8 @@ impl CollideContext<'_> {
     #[inline(always)]
     fn note_fresh(&self, pair: &mut Pair, fresh: &Fresh, reusable: bool) {
         pair.has_manifold = reusable && self.filters.contact.is_none();
-        pair.manifold_pose = fresh.between;
-        pair.manifold_rotation = self.solver.masses[pair.bodies[0] as usize].rotation;
+        let shapes = pair.shapes.map(|slot| &self.shapes[slot as usize]);
+        pair.note_manifold(&fresh.between, self.solver.masses[pair.bodies[0] as usize].rotation, shapes);
     }
 
     /// How both bodies are turned.

@@ -68,6 +68,7 @@ struct CollideContext<'a> {
     solver: &'a SolverBodies,
     broad_phase: &'a crate::broad_phase::BroadPhase,
     settings: &'a WorldSettings,
+    level: SimdLevel,
     filters: &'a UserFilters,
     /// Shapes whose proxies have moved since the last narrow phase.
     moved: &'a [bool],
@@ -147,6 +148,7 @@ impl World {
             solver: &self.solver_bodies,
             broad_phase: &self.broad_phase,
             settings: &self.scaled,
+            level: self.level,
             filters: &self.filters,
             moved: &self.moved_shapes,
             dt,
@@ -225,10 +227,9 @@ impl World {
                 if begin.is_new {
                     arbiter.data = fresh_data();
                 }
-                let centers = begin.bodies.map(|body| masses[body as usize].pose());
-                let rotations = centers.map(|center| center.rotation);
+                let rotations = begin.bodies.map(|body| masses[body as usize].rotation);
                 update_contacts(&mut arbiter.data, &begin.places, rotations, break_distance);
-                (pair.has_manifold, pair.manifold_pose) = (reusable, centers[0].relative(&centers[1]));
+                pair.has_manifold = reusable;
                 mix_shape_materials(pair, &mut arbiter.data, shapes, bodies);
             }
         });

@@ -22,28 +22,29 @@
 //! first to beat, which leaves out more candidates. As equal gaps go to the lowest face or edges in any case, the
 //! result is the same bits with it or without.
 //!
-//! Loops over corners, faces and edges run over groups of [`LANES`] in plain arrays, compiled once for what every
+//! Loops over corners, faces and edges run over groups of eight in plain arrays, compiled once for what every
 //! machine has and once for AVX2. Lanes never mix but to find a minimum, so both give the same bits.
 
-use super::clip::{ClipPoint, clip_polygon, reduce};
+mod edges;
+mod view;
+
 use super::cuboid::{ALIGNED, EDGE_BIAS, stands_in};
 use super::distance::{Support, closest};
-use super::polyhedron::{ALL_LANES, CuboidFeatures, Polyhedron, negatives};
+use super::polyhedron::{CuboidFeatures, Polyhedron};
 use super::{Manifold, ManifoldPoint, PairCache};
-use crate::math::{Mat3, Pose, Real, Vec3, clamp, max, min, normalize_or};
-use crate::shape::{ConvexHull, Cuboid, HalfEdge, LANES, Plane};
+use crate::math::{Mat3, Pose, Real, Vec3, clamp, min};
+use crate::shape::{ConvexHull, Cuboid, Plane};
 #[cfg(target_arch = "x86_64")]
 use crate::simd::Avx2;
 use crate::simd::{Baseline, Instructions, Kernel, SimdLevel};
+use edges::{Edge, EdgeGroup, MAX_EDGE_WORDS};
+use view::View;
 
 /// A face of hull 2 is the reference when it is better by this share of the smaller size.
 const FACE_BIAS: Real = 2e-3;
 /// An edge pair is looked at when it is better than the best face by this share of the smaller size.
 const EDGE_GAIN: Real = 2e-4;
-/// Share of the smaller size by which side planes are moved out, so that corners on the border stay corners.
-const GROWTH: Real = 1e-4;
-/// Edges with `sin²` of their angle below this are parallel: faces stand in for them.
-const PARALLEL: Real = 1e-5;
+
 /// Share by which balls are taken to be larger or smaller than they are, so that rounding never makes them tell more
 /// than is true.
 const BALL_SLACK: Real = 1e-4;
@@ -52,8 +53,6 @@ const BALL_SLACK: Real = 1e-4;
 const MAX_FACE_GROUPS: usize = 64;
 /// Groups of faces that most hulls get by with.
 const FEW_FACE_GROUPS: usize = 8;
-/// A hull of 255 corners has at most 759 edges.
-const MAX_EDGE_WORDS: usize = 12;
 
 const FACE1: u32 = 1 << 30;
 const FACE2: u32 = 2 << 30;
@@ -207,39 +206,6 @@ impl Axis {
     fn edges(self) -> (usize, usize) {
         (self.index() >> 15, self.index() & 0x7FFF)
     }
-}
-
-/// An edge with the normals of its faces, all in the frame of hull 1.
-#[derive(Clone, Copy, Default)]
-struct Edge {
-    start: Vec3,
-    along: Vec3,
-    left: Vec3,
-    right: Vec3,
-}
-
-/// The side of a pair seen from one of its hulls: what face queries and clipping need.
-struct View<'a, const G: usize> {
-    own: &'a Polyhedron<'a>,
-    other: &'a Polyhedron<'a>,
-    /// Axes and origin of the other hull's frame in the own one.
-    m: Mat3,
-    t: Vec3,
-    /// Height of the other centre over each of the own faces.
-    heights: [[Real; LANES]; G],
-}
-
-/// Some edges of a hull, a bit each.
-type EdgeSet = [u64; MAX_EDGE_WORDS];
-
-/// [`LANES`] edges of hull 2, turned into the frame of hull 1: an edge of hull 1 is tried against all of them at once.
-#[derive(Clone, Copy, Default)]
-struct EdgeGroup {
-    indices: [u32; LANES],
-    start: [[Real; LANES]; 3],
-    along: [[Real; LANES]; 3],
-    left: [[Real; LANES]; 3],
-    right: [[Real; LANES]; 3],
 }
 
 impl HullPair<'_> {
@@ -460,126 +426,6 @@ impl HullPair<'_> {
     }
 }
 
-impl Edge {
-    #[inline(always)]
-    fn new(polyhedron: &Polyhedron, index: usize) -> Self {
-        let (start, end) = polyhedron.edge_points(index);
-        let normal = |e: HalfEdge| polyhedron.planes[e.face as usize].normal;
-        Self {
-            start,
-            along: end - start,
-            left: normal(polyhedron.edges[index]),
-            right: normal(polyhedron.edges[index ^ 1]),
-        }
-    }
-
-    #[inline(always)]
-    fn placed(&self, m: &Mat3, t: Vec3) -> Self {
-        Self { start: *m * self.start + t, along: *m * self.along, left: *m * self.left, right: *m * self.right }
-    }
-
-    /// Gap and normal of a pair of edges whose arcs cross; `self` is of hull 1.
-    #[inline(always)]
-    fn gap(&self, other: &Self) -> Option<(Real, Vec3)> {
-        let (c, d) = (other.left.dot(self.along), other.right.dot(self.along));
-        let (a, b) = (self.left.dot(other.along), self.right.dot(other.along));
-        // One branch, as the three tests are hard to foretell each by itself.
-        if !((c * d < 0.0) & (a * b < 0.0) & (c * b < 0.0)) {
-            return None;
-        }
-        self.gap_of_crossing(other.start, other.along)
-    }
-
-    /// Gap and normal of a pair of edges whose arcs are known to cross.
-    #[inline(always)]
-    fn gap_of_crossing(&self, start: Vec3, along: Vec3) -> Option<(Real, Vec3)> {
-        let cross = self.along.cross(along);
-        let squared = cross.length_squared();
-        if squared <= PARALLEL * self.along.length_squared() * along.length_squared() {
-            return None;
-        }
-        let normal = normalize_or(cross, self.left);
-        let normal = if normal.dot(self.left + self.right) < 0.0 { -normal } else { normal };
-        Some((normal.dot(start - self.start), normal))
-    }
-}
-
-impl EdgeGroup {
-    /// Takes up to [`LANES`] edges out of a set; false if there is none left.
-    #[inline(always)]
-    fn fill(&mut self, set: &mut EdgeSet, polyhedron: &Polyhedron, (m, t): (&Mat3, Vec3)) -> bool {
-        let words = polyhedron.edges.len().div_ceil(128).min(MAX_EDGE_WORDS);
-        let mut count = 0;
-        for (word, bits) in set[..words].iter_mut().enumerate() {
-            while *bits != 0 && count < LANES {
-                let index = 64 * word as u32 + bits.trailing_zeros();
-                *bits &= *bits - 1;
-                let edge = Edge::new(polyhedron, 2 * index as usize);
-                self.indices[count] = index;
-                let lists = [&mut self.start, &mut self.along, &mut self.left, &mut self.right];
-                for (list, v) in lists.into_iter().zip([edge.start, edge.along, edge.left, edge.right]) {
-                    (list[0][count], list[1][count], list[2][count]) = (v.x, v.y, v.z);
-                }
-                count += 1;
-            }
-        }
-        if count == 0 {
-            return false;
-        }
-        // No normals, no arcs: what is left over from the last group never crosses.
-        for lane in count..LANES {
-            for list in [&mut self.left, &mut self.right] {
-                (list[0][lane], list[1][lane], list[2][lane]) = (0.0, 0.0, 0.0);
-            }
-        }
-        turn(&mut self.start, m);
-        turn(&mut self.along, m);
-        turn(&mut self.left, m);
-        turn(&mut self.right, m);
-        for k in 0..LANES {
-            self.start[0][k] += t.x;
-            self.start[1][k] += t.y;
-            self.start[2][k] += t.z;
-        }
-        true
-    }
-
-    /// Puts in the place of `best` what has a larger gap.
-    #[inline(always)]
-    fn improve(&self, index1: u32, edge: &Edge, best: &mut Axis) {
-        let (c, d) = (dots(edge.along, &self.left), dots(edge.along, &self.right));
-        let (a, b) = (dots(edge.left, &self.along), dots(edge.right, &self.along));
-        let mut sign = [0.0; LANES];
-        for k in 0..LANES {
-            sign[k] = max(max(c[k] * d[k], a[k] * b[k]), c[k] * b[k]);
-        }
-        let mut bits = negatives(&sign);
-        while bits != 0 {
-            let k = bits.trailing_zeros() as usize;
-            bits &= bits - 1;
-            // Not so for a negative zero.
-            if sign[k] < 0.0 {
-                let take = |list: &[[Real; LANES]; 3]| Vec3::new(list[0][k], list[1][k], list[2][k]);
-                let Some((gap, _)) = edge.gap_of_crossing(take(&self.start), take(&self.along)) else { continue };
-                let code = EDGES | index1 << 16 | self.indices[k] << 1;
-                if gap > best.gap || (gap == best.gap && code < best.code) {
-                    *best = Axis { code, gap };
-                }
-            }
-        }
-    }
-}
-
-/// `m v` for each lane.
-#[inline(always)]
-fn turn(v: &mut [[Real; LANES]; 3], m: &Mat3) {
-    let [x, y, z] = *v;
-    for (axis, list) in v.iter_mut().enumerate() {
-        let (a, b, c) = (m.x_axis[axis], m.y_axis[axis], m.z_axis[axis]);
-        *list = std::array::from_fn(|k| a * x[k] + b * y[k] + c * z[k]);
-    }
-}
-
 /// `mᵀ v`: the direction `v` in the frame whose axes are the columns of `m`.
 #[inline(always)]
 fn transposed_mul(m: &Mat3, v: Vec3) -> Vec3 {
@@ -597,198 +443,6 @@ fn inverted(m: &Mat3, t: Vec3) -> (Mat3, Vec3) {
 #[inline(always)]
 fn face_gap(plane: Plane, other: &Polyhedron, m: &Mat3, t: Vec3) -> Real {
     other.lowest(transposed_mul(m, plane.normal)) + plane.normal.dot(t) - plane.offset
-}
-
-/// `u · v` for each lane.
-#[inline(always)]
-fn dots(u: Vec3, v: &[[Real; LANES]; 3]) -> [Real; LANES] {
-    std::array::from_fn(|k| u.x * v[0][k] + u.y * v[1][k] + u.z * v[2][k])
-}
-
-impl<'a, const G: usize> View<'a, G> {
-    #[inline(always)]
-    fn new(own: &'a Polyhedron<'a>, other: &'a Polyhedron<'a>, m: Mat3, t: Vec3) -> Self {
-        let mut heights = [[0.0; LANES]; G];
-        let center = m * other.center + t;
-        for (height, face) in heights.iter_mut().zip(own.faces) {
-            *height = std::array::from_fn(|k| {
-                face.x[k] * center.x + face.y[k] * center.y + face.z[k] * center.z - face.offset[k]
-            });
-        }
-        Self { own, other, m, t, heights }
-    }
-
-    #[inline(always)]
-    fn height(&self, face: usize) -> Real {
-        self.heights[face / LANES][face % LANES]
-    }
-
-    /// Height of the other hull over the plane of a face.
-    #[inline(always)]
-    fn face_gap(&self, face: usize) -> Real {
-        face_gap(self.own.planes[face], self.other, &self.m, self.t)
-    }
-
-    /// The face that the other centre is highest above, most often the best one; of several, the first.
-    #[inline(always)]
-    fn highest(&self) -> usize {
-        let heights = &self.heights[..self.own.faces.len()];
-        let mut running = [-Real::MAX; LANES];
-        for group in heights {
-            for k in 0..LANES {
-                running[k] = max(group[k], running[k]);
-            }
-        }
-        let highest = running.iter().fold(-Real::MAX, |highest, &height| max(height, highest));
-        for (index, group) in heights.iter().enumerate() {
-            let lower = negatives(&std::array::from_fn(|k| group[k] - highest));
-            if lower != ALL_LANES {
-                let face = index * LANES + (!lower).trailing_zeros() as usize;
-                return if face < self.own.planes.len() { face } else { 0 };
-            }
-        }
-        0
-    }
-
-    /// The first face with the largest gap; faces that cannot reach `floor` are not looked at. A face whose gap is
-    /// known prunes the others from the start.
-    #[inline(always)]
-    fn best_face(&self, known: Option<(usize, Real)>, floor: Real) -> (usize, Real) {
-        let radius = self.other.inner_radius * (1.0 - BALL_SLACK);
-        let (first, mut gap) = if let Some(known) = known {
-            known
-        } else {
-            let first = self.highest();
-            (first, if self.height(first) - radius < floor { -Real::MAX } else { self.face_gap(first) })
-        };
-        let mut best = first;
-        for (group, heights) in self.heights[..self.own.faces.len()].iter().enumerate() {
-            let bound = max(gap, floor);
-            let mut bits = ALL_LANES & !negatives(&std::array::from_fn(|k| heights[k] - radius - bound));
-            while bits != 0 {
-                let lane = bits.trailing_zeros() as usize;
-                bits &= bits - 1;
-                let face = group * LANES + lane;
-                if face == first || heights[lane] - radius < max(gap, floor) || face >= self.own.planes.len() {
-                    continue;
-                }
-                let g = self.face_gap(face);
-                if g > gap || (g == gap && face < best) {
-                    (best, gap) = (face, g);
-                }
-            }
-        }
-        (best, gap)
-    }
-
-    /// The edges that can have a gap of `floor` or more: see the top of this file.
-    #[inline(always)]
-    fn promising_edges(&self, floor: Real) -> EdgeSet {
-        let limit = floor + self.other.inner_radius * (1.0 - BALL_SLACK);
-        let squared = limit * limit;
-        let mut set = [0; MAX_EDGE_WORDS];
-        for (group, (heights, faces)) in self.heights.iter().zip(self.own.faces).enumerate() {
-            // A face whose height `h` is below the limit reaches it on no arc to a lower face if `h / cos(half the
-            // arc)` does not: then both differences are negative.
-            let short = std::array::from_fn(|k| heights[k] - limit);
-            let flat = std::array::from_fn(|k| {
-                if heights[k] > 0.0 { heights[k] * heights[k] - squared * faces.cosine_squared[k] } else { -1.0 }
-            });
-            let mut bits = ALL_LANES & !(negatives(&short) & negatives(&flat));
-            while bits != 0 {
-                let face = group * LANES + bits.trailing_zeros() as usize;
-                bits &= bits - 1;
-                if face >= self.own.planes.len() {
-                    break; // padding, which only a pose that is no number can reach
-                }
-                // The edge is met from the higher of its faces.
-                let height = self.height(face);
-                for border in self.own.border(face) {
-                    let rises = (height > 0.0) & (height * height >= squared * border.cosine_squared);
-                    set[border.edge as usize / 64] |= u64::from((height >= limit) | rises) << (border.edge % 64);
-                }
-            }
-        }
-        set
-    }
-
-    /// Clips the incident face against the reference face; the manifold is in the own frame.
-    #[inline(always)]
-    fn face_contact(&self, face: usize, reach: (Real, Real), manifold: &mut Manifold) {
-        let incident = self.incident_face(self.own.planes[face].normal);
-        let corners = self.own.face_loop(face).count() + self.other.face_loop(incident).count();
-        // Each plane adds at most one corner. Large faces are rare: only they pay for clearing large buffers.
-        if corners <= 8 {
-            self.clip_faces::<8>(face, incident, reach, manifold);
-        } else if corners <= 24 {
-            self.clip_faces::<24>(face, incident, reach, manifold);
-        } else {
-            self.clip_faces::<512>(face, incident, reach, manifold);
-        }
-    }
-
-    /// Of the faces around the other hull's lowest corner, the one that looks most against `normal`.
-    ///
-    /// Among all faces it would be the wrong one where two faces meet almost flat: the one that looks straighter down may
-    /// end at the edge between them, with the deepest corner on the other one.
-    #[inline(always)]
-    fn incident_face(&self, normal: Vec3) -> usize {
-        let n = transposed_mul(&self.m, normal);
-        let mut best = 0;
-        let mut cosine = Real::MAX;
-        for &face in self.other.faces_around(self.other.lowest_corner(n)) {
-            let c = self.other.planes[face as usize].normal.dot(n);
-            // Clearly more, so that of two faces at the same angle the first one stays.
-            if c < cosine - 1e-3 {
-                (best, cosine) = (face as usize, c);
-            }
-        }
-        best
-    }
-
-    fn clip_faces<const N: usize>(
-        &self,
-        face: usize,
-        incident: usize,
-        (margin, size): (Real, Real),
-        manifold: &mut Manifold,
-    ) {
-        let plane = self.own.planes[face];
-        let mut buffers = [[ClipPoint::default(); N]; 2];
-        let [front, back] = &mut buffers;
-        let (mut front, mut back) = (front, back);
-        let mut count = 0;
-        for edge in self.other.face_loop(incident) {
-            let position = self.m * self.other.vertices[self.other.edges[edge].origin as usize] + self.t;
-            let separation = plane.normal.dot(position) - plane.offset;
-            front[count] = ClipPoint { position, separation, feature: (edge as u32 + 1) << 12 };
-            count += 1;
-        }
-        for (cut, edge) in self.own.face_loop(face).enumerate() {
-            let (out, offset) = self.own.side_plane(edge);
-            count = clip_polygon(&front[..count], (out, offset + GROWTH * size), cut as u32, back);
-            std::mem::swap(&mut front, &mut back);
-        }
-        let mut kept = 0;
-        for k in 0..count {
-            if front[k].separation <= margin {
-                front[kept] = front[k];
-                kept += 1;
-            }
-        }
-        let faces = ((face as u32 + 1).wrapping_mul(0x85EB_CA6B) ^ (incident as u32 + 1).wrapping_mul(0xC2B2_AE35))
-            & 0x1FFF_F000;
-        let (chosen, count) = reduce(&front[..kept], plane.normal, size);
-        for &k in &chosen[..count] {
-            let p = front[k];
-            manifold.push(ManifoldPoint {
-                point1: p.position - plane.normal * p.separation,
-                normal: plane.normal,
-                separation: p.separation,
-                feature: p.feature ^ faces,
-            });
-        }
-    }
 }
 
 #[cfg(test)]
