@@ -5,13 +5,12 @@ use super::bodies::world_inverse_inertia;
 use super::collide::shapes_overlap;
 use super::pairs::PairRules;
 use super::timings::{Phase, PhaseClock, Timings};
-use crate::arbiter::{EndReason, Entry, NONE};
+use crate::arbiter::{Entry, NONE};
 use crate::broad_phase::Boxes;
 use crate::error::{Error, in_range};
 use crate::id::BodyId;
 use crate::math::{Aabb, Real, Vec3, min};
 use crate::parallel::{BlockList, Gather, SharedSlice};
-use crate::simd::prefetch;
 use crate::solver::{
     BodyMass, BodyMotion, BodyState, IntegrateParameters, IntegrateTarget, Integration, Pass, PassParameters,
     PrepareContext, Softness, StoreTarget,
@@ -30,11 +29,6 @@ const ROWS_PER_BLOCK: usize = 512;
 const EMPTY_PER_BLOCK: usize = 16;
 /// Parts of the search for pairs for each thread: they differ in size.
 const PARTS_PER_THREAD: usize = 16;
-
-/// How many pairs ahead of its making what a pair touches is asked for.
-const FOUND_AHEAD: usize = 6;
-/// The same for arbiters that end.
-const BROKEN_AHEAD: usize = 4;
 
 /// Awake bodies, pairs and arbiters from which on a step uses several threads: below, waiting for each other costs more.
 const WORK_FOR_THREADS: usize = 1500;
@@ -169,7 +163,8 @@ impl World {
             && self.events.are_told()
     }
 
-    /// Lists the awake bodies and turns gravity and their forces into this step's accelerations.
+    /// Lists the awake bodies and turns gravity and their forces into this step's accelerations; beside that, the trees are
+    /// made ready for the search.
     fn apply_forces(&mut self) {
         if std::mem::take(&mut self.awake_changed) {
             let list = &mut self.scratch.sorted_awake;
@@ -182,13 +177,19 @@ impl World {
         let states = SharedSlice::new(&mut self.solver_bodies.states);
         let motions = SharedSlice::new(&mut self.solver_bodies.motions);
         let masses = &self.solver_bodies.masses;
-        self.pool.run(awake.len().div_ceil(BODIES_PER_BLOCK), |block| {
+        let (blocks, broad_phase) = (awake.len().div_ceil(BODIES_PER_BLOCK), &mut self.broad_phase);
+        let accelerate_block = |block: usize| {
             for &body in block_of(awake, block) {
                 let index = body as usize;
                 // SAFETY: a body stands in the list once.
                 let (body, state, motion) =
                     unsafe { (bodies.get_mut(index), states.get_mut(index), motions.get_mut(index)) };
                 accelerate(body, (state, motion, &masses[index]), gravity);
+            }
+        };
+        self.pool.run_beside(blocks, accelerate_block, || {
+            if broad_phase.has_moved() {
+                broad_phase.tighten();
             }
         });
     }
@@ -221,30 +222,10 @@ impl World {
         }
         let mut found = std::mem::take(&mut self.scratch.pairs);
         self.search_pairs(&mut found);
-        for (at, &(a, b)) in found.iter().enumerate() {
-            if let Some(&(a, b)) = found.get(at + 2 * FOUND_AHEAD) {
-                [a, b].into_iter().for_each(|slot| prefetch(&self.shapes[slot as usize]));
-            }
-            if let Some(&(a, b)) = found.get(at + FOUND_AHEAD) {
-                self.prefetch_pair(a, b);
-            }
-            if self.passes_pair_filter(a, b) {
-                self.add_pair(a, b);
-            }
-        }
+        found.retain(|&(a, b)| self.passes_pair_filter(a, b));
+        self.add_pairs(&found);
         found.clear();
         self.scratch.pairs = found;
-    }
-
-    /// Asks for what a new pair of two shapes will touch.
-    fn prefetch_pair(&self, a: u32, b: u32) {
-        self.pair_set.prefetch(a, b);
-        for slot in [a, b] {
-            let body = &self.bodies[self.shapes[slot as usize].body as usize];
-            prefetch(&body.awake);
-            prefetch(&body.first_pair);
-            prefetch(&body.reach);
-        }
     }
 
     /// The pairs that are new, sorted.
@@ -442,15 +423,7 @@ impl World {
         empty.sort_unstable();
         empty.dedup();
         self.keep_overlapping(&mut empty);
-        for (at, &index) in empty.iter().enumerate() {
-            if let Some(&later) = empty.get(at + 2 * BROKEN_AHEAD) {
-                self.arbiters.prefetch_links(later);
-            }
-            if let Some(&later) = empty.get(at + BROKEN_AHEAD) {
-                self.arbiters.prefetch_end(later);
-            }
-            self.end_arbiter(index, EndReason::Separated);
-        }
+        self.end_separated(&empty);
         empty.clear();
         self.narrow.empty = empty;
     }
