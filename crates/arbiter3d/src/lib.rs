@@ -24,6 +24,7 @@
 
 mod arbiter;
 mod broad_phase;
+mod edge_lists;
 mod error;
 #[cfg(doctest)]
 mod guide;

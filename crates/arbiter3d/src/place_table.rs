@@ -50,14 +50,27 @@ impl PlaceTable {
 
     /// Adds a place that is not there yet.
     pub fn insert(&mut self, hash: u64, place: u32, hash_of: impl Fn(u32) -> u64) {
-        self.len += 1;
-        if 2 * self.len > self.slots.len() {
-            let slots = (2 * self.slots.len()).max(MIN_SLOTS);
+        self.reserve(1, hash_of);
+        self.insert_reserved(hash, place);
+    }
+
+    /// Makes room for `count` more places.
+    pub fn reserve(&mut self, count: usize, hash_of: impl Fn(u32) -> u64) {
+        let mut slots = self.slots.len().max(MIN_SLOTS);
+        while 2 * (self.len + count) > slots {
+            slots *= 2;
+        }
+        if slots > self.slots.len() {
             let old = std::mem::replace(&mut self.slots, vec![NONE; slots]);
             for place in old.into_iter().filter(|&place| place != NONE) {
                 self.put(hash_of(place), place);
             }
         }
+    }
+
+    /// Adds a place that is not there yet, for which there is room. Looks at no other entry.
+    pub fn insert_reserved(&mut self, hash: u64, place: u32) {
+        self.len += 1;
         self.put(hash, place);
     }
 

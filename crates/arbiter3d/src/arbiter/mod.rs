@@ -28,7 +28,7 @@ pub use store::{Arbiter, ArbiterId, EndReason};
 pub(crate) use contact_data::{
     FRICTION_OVERRIDDEN, ONE_NORMAL, RESTITUTION_OVERRIDDEN, ROLLING_OVERRIDDEN, SLOTS, TANGENT_VELOCITY_OVERRIDDEN,
 };
-pub(crate) use store::{ArbiterStore, Entry, IdMap, NONE};
+pub(crate) use store::{ArbiterStore, Entry, IdMap, NONE, Name};
 
 use crate::math::Vec3;
 

@@ -1,18 +1,22 @@
 //! Where arbiters live: a pool with stable places, found by key, by body or by id.
 //!
 //! A place is reused after its arbiter has ended; the generation in the [`ArbiterId`] then differs, so an old id finds
-//! nothing. The arbiters of a body hang on a doubly linked list through the records themselves, so that a world in steady
-//! state allocates nothing while contacts come and go. The solver walks `awake`, the live arbiters of awake bodies in the
+//! nothing. The arbiters of a body hang on a list ([`EdgeLists`]). Those that begin in a step are made together, their records
+//! by all threads. The solver walks `awake`, the live arbiters of awake bodies in the
 //! order of their keys: the order of solving then depends on names, not on history.
 
 use super::contact_data::ContactData;
 use super::key::ArbiterKey;
+use crate::edge_lists::EdgeLists;
 use crate::id::BodyId;
+use crate::parallel::{SharedSlice, StagePool};
 pub(crate) use crate::place_table::NONE;
 use crate::place_table::PlaceTable;
 use crate::storage::{self, Peak};
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
+use std::mem::MaybeUninit;
+use std::slice;
 
 /// Names an arbiter for as long as it lives.
 ///
@@ -66,7 +70,7 @@ pub enum EndReason {
 /// # Ok::<(), arbiter3d::Error>(())
 /// ```
 #[derive(Clone, Debug)]
-#[repr(C, align(64))] // names and links fill the first cache line, the contact data follow
+#[repr(C, align(64))] // names and what the contacts share fill the first two cache lines, the contacts follow
 pub struct Arbiter {
     pub(crate) key: ArbiterKey,
     pub(crate) body1: BodyId,
@@ -79,13 +83,32 @@ pub struct Arbiter {
     pub(crate) begun: bool,
     /// Whether one of its bodies is awake.
     pub(crate) awake: bool,
-    /// Neighbours in the lists of body 1 and body 2, as `index * 2 + side`.
-    next: [u32; 2],
-    previous: [u32; 2],
     pub(crate) data: ContactData,
 }
 
 impl Arbiter {
+    /// None yet.
+    fn blank(index: u32, tag: u32) -> Self {
+        Self {
+            data: ContactData::default(),
+            key: ArbiterKey::new(0, 0),
+            body1: BodyId::WORLD,
+            body2: BodyId::WORLD,
+            id: ArbiterId { index, generation: tag },
+            pair: NONE,
+            alive: false,
+            begun: false,
+            awake: false,
+        }
+    }
+
+    /// Becomes the next arbiter at its place, without pair; the data stay.
+    fn begin(&mut self, name: &Name) {
+        self.id.generation = self.id.generation.wrapping_add(1);
+        (self.key, self.body1, self.body2) = (name.key, name.bodies[0], name.bodies[1]);
+        (self.alive, self.begun, self.pair) = (true, false, NONE);
+    }
+
     /// Names this arbiter while it lives.
     #[must_use]
     pub fn id(&self) -> ArbiterId {
@@ -134,6 +157,13 @@ impl Arbiter {
     }
 }
 
+/// What an arbiter that begins is called.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Name {
+    pub key: ArbiterKey,
+    pub bodies: [BodyId; 2],
+}
+
 /// Multiply-and-rotate hashing: keys are ids, not attacks.
 #[derive(Default)]
 pub(crate) struct IdHasher(u64);
@@ -166,6 +196,20 @@ pub(crate) struct Entry {
     generation: u32,
 }
 
+impl Entry {
+    const NONE: Self = Self { key: ArbiterKey::new(0, 0), index: NONE, generation: 0 };
+}
+
+/// Arbiters that a thread makes at a time.
+const NEW_PER_BLOCK: usize = 16;
+/// How many arbiters ahead of its making what an arbiter touches is asked for.
+const NEW_AHEAD: usize = 8;
+
+/// Arbiters that a thread ends at a time.
+const ENDS_PER_BLOCK: usize = 16;
+/// How many arbiters ahead of its end what an arbiter touches is asked for.
+const ENDS_AHEAD: usize = 4;
+
 /// In place of a generation: no awake arbiter.
 const ASLEEP: u64 = u64::MAX;
 
@@ -179,8 +223,8 @@ pub(crate) struct ArbiterStore {
     awake: Vec<u64>,
     free: Vec<u32>,
     by_key: PlaceTable,
-    /// First list entry of each body, by body index.
-    heads: Vec<u32>,
+    /// The arbiters of each body.
+    lists: EdgeLists,
     /// Live arbiters of awake bodies: `sorted` in key order, `fresh` not merged yet.
     sorted: Vec<Entry>,
     fresh: Vec<Entry>,
@@ -240,81 +284,103 @@ impl ArbiterStore {
         self.by_key.find(key.hash(), |place| self.arbiters[place as usize].key == key)
     }
 
-    /// Asks for what making an arbiter of this key, the `nth` from now on, will touch.
-    #[inline]
-    pub fn prefetch_new(&self, key: ArbiterKey, bodies: [u32; 2], nth: usize) {
-        self.by_key.prefetch(key.hash());
-        let place = self.free.len().checked_sub(nth + 1).and_then(|at| self.arbiters.get(self.free[at] as usize));
-        let heads = bodies.map(|body| self.heads.get(body as usize).copied().unwrap_or(NONE));
-        let heads = heads.map(|head| self.arbiters.get((head >> 1) as usize));
-        for arbiter in [place, heads[0], heads[1]].into_iter().flatten() {
-            crate::simd::prefetch(&arbiter.next);
-        }
-    }
-
-    /// Asks for the names and links of an arbiter.
-    #[inline]
-    pub fn prefetch_links(&self, index: u32) {
-        crate::simd::prefetch(&self.arbiters[index as usize].next);
-    }
-
-    /// Asks for what ending an arbiter will touch, once its links are there.
-    #[inline]
-    pub fn prefetch_end(&self, index: u32) {
-        let arbiter = &self.arbiters[index as usize];
-        self.by_key.prefetch(arbiter.key.hash());
-        for edge in arbiter.next.into_iter().chain(arbiter.previous) {
-            if let Some(neighbour) = self.arbiters.get((edge >> 1) as usize) {
-                crate::simd::prefetch(&neighbour.next);
-            }
-        }
-    }
-
-    /// Makes an arbiter.
-    #[cfg(test)]
+    /// Makes an arbiter; the key must be free and the bodies different.
     pub fn create(&mut self, key: ArbiterKey, body1: BodyId, body2: BodyId) -> u32 {
-        let index = self.create_blank(key, body1, body2);
-        self.arbiters[index as usize].data = ContactData::default();
-        index
-    }
-
-    /// Makes an arbiter; the key must be free and the bodies different. Its data may be those of one that has ended.
-    pub fn create_blank(&mut self, key: ArbiterKey, body1: BodyId, body2: BodyId) -> u32 {
         debug_assert!(self.find(key).is_none(), "{key:?} is in use");
-        let index = self.free.pop().unwrap_or_else(|| self.add_place(key, body1, body2));
+        let index = self.free.pop().unwrap_or_else(|| self.add_place());
         let arbiter = &mut self.arbiters[index as usize];
-        arbiter.id.generation = arbiter.id.generation.wrapping_add(1);
-        (arbiter.key, arbiter.body1, arbiter.body2) = (key, body1, body2);
-        (arbiter.alive, arbiter.begun, arbiter.awake, arbiter.pair) = (true, false, false, NONE);
+        arbiter.begin(&Name { key, bodies: [body1, body2] });
+        (arbiter.awake, arbiter.data) = (false, ContactData::default());
         let arbiters = &self.arbiters;
         self.by_key.insert(key.hash(), index, |place| arbiters[place as usize].key.hash());
-        self.link(index, 0, body1.index);
-        self.link(index, 1, body2.index);
+        self.lists.grow(arbiters.len(), body1.index.max(body2.index) as usize + 1);
+        self.lists.link(index, [body1.index, body2.index]);
         self.set_awake(index, true);
         index
     }
 
     /// Makes the pool one place larger.
-    fn add_place(&mut self, key: ArbiterKey, body1: BodyId, body2: BodyId) -> u32 {
+    fn add_place(&mut self) -> u32 {
         let index = u32::try_from(self.arbiters.len()).unwrap_or(NONE);
-        let arbiter = Arbiter {
-            data: ContactData::default(),
-            key,
-            body1,
-            body2,
-            id: ArbiterId { index, generation: self.tag },
-            pair: NONE,
-            alive: false,
-            begun: false,
-            awake: false,
-            next: [NONE; 2],
-            previous: [NONE; 2],
-        };
-        storage::push(&mut self.arbiters, arbiter);
+        storage::push(&mut self.arbiters, Arbiter::blank(index, self.tag));
         storage::push(&mut self.awake, ASLEEP);
         // The free list has room for every place: else it would grow in the middle of a step.
         storage::reserve(&mut self.free, self.arbiters.len());
         index
+    }
+
+    /// Makes arbiters with the names that `name_of` finds for `0..count`, and has `fill` make what they hold out of the data
+    /// of some that have ended. The keys must be free, the bodies of each different and below `bodies`.
+    ///
+    /// Records are written on all threads; beside that, one thread enters the names.
+    pub fn create_many(
+        &mut self,
+        count: usize,
+        bodies: usize,
+        pool: &mut StagePool,
+        name_of: impl Fn(usize) -> Name + Sync,
+        fill: impl Fn(usize, &mut Arbiter) + Sync,
+    ) {
+        let (old, reused) = (self.arbiters.len(), self.free.len().min(count));
+        let (places, first_fresh) = (old + count - reused, self.fresh.len());
+        self.make_room(places, count, bodies);
+        let (tag, free) = (self.tag, &self.free[..]);
+        let place_of = |nth: usize| if nth < reused { free[free.len() - 1 - nth] } else { (old + nth - reused) as u32 };
+        // SAFETY: there is room for so many; what is not an arbiter yet is written before it is read.
+        let slots =
+            unsafe { slice::from_raw_parts_mut(self.arbiters.as_mut_ptr().cast::<MaybeUninit<Arbiter>>(), places) };
+        let (slots, awake) = (SharedSlice::new(slots), SharedSlice::new(&mut self.awake));
+        let fresh = SharedSlice::new(&mut self.fresh[first_fresh..]);
+        let make = |block: usize| {
+            for nth in block * NEW_PER_BLOCK..((block + 1) * NEW_PER_BLOCK).min(count) {
+                let (index, name) = (place_of(nth), name_of(nth));
+                // SAFETY: each has a place of its own and belongs to one block; places that are used again hold arbiters.
+                unsafe {
+                    let slot = slots.get_mut(index as usize);
+                    let arbiter = match nth < reused {
+                        true => slot.assume_init_mut(),
+                        false => slot.write(Arbiter::blank(index, tag)),
+                    };
+                    arbiter.begin(&name);
+                    arbiter.awake = true;
+                    let generation = arbiter.id.generation;
+                    *awake.get_mut(index as usize) = u64::from(generation);
+                    *fresh.get_mut(nth) = Entry { key: name.key, index, generation };
+                    fill(nth, arbiter);
+                }
+                if nth + NEW_AHEAD < count {
+                    slots.prefetch(place_of(nth + NEW_AHEAD) as usize);
+                }
+            }
+        };
+        let (by_key, lists) = (&mut self.by_key, &mut self.lists);
+        pool.run_beside(count.div_ceil(NEW_PER_BLOCK), make, || {
+            for nth in 0..count {
+                if nth + NEW_AHEAD < count {
+                    by_key.prefetch(name_of(nth + NEW_AHEAD).key.hash());
+                }
+                let name = name_of(nth);
+                by_key.insert_reserved(name.key.hash(), place_of(nth));
+                lists.link(place_of(nth), name.bodies.map(|body| body.index));
+            }
+        });
+        // SAFETY: old ones keep their places, and each new place has been written.
+        unsafe { self.arbiters.set_len(places) };
+        self.free.truncate(self.free.len() - reused);
+    }
+
+    /// Makes room for so many places in all, of which `count` get a new arbiter.
+    fn make_room(&mut self, places: usize, count: usize, bodies: usize) {
+        storage::reserve(&mut self.arbiters, places);
+        storage::reserve(&mut self.free, places);
+        storage::reserve(&mut self.awake, places);
+        self.awake.resize(places, ASLEEP);
+        let arbiters = &self.arbiters;
+        self.by_key.reserve(count, |place| arbiters[place as usize].key.hash());
+        self.lists.grow(places, bodies);
+        let fresh = self.fresh.len() + count;
+        storage::reserve(&mut self.fresh, fresh);
+        self.fresh.resize(fresh, Entry::NONE);
     }
 
     /// Ends an arbiter; its place goes back to the pool.
@@ -327,9 +393,47 @@ impl ArbiterStore {
         let (key, body1, body2) = (arbiter.key, arbiter.body1.index, arbiter.body2.index);
         let arbiters = &self.arbiters;
         self.by_key.remove(key.hash(), index, |place| arbiters[place as usize].key.hash());
-        self.unlink(index, 0, body1);
-        self.unlink(index, 1, body2);
+        self.lists.unlink(index, [body1, body2]);
         self.free.push(index);
+        self.stale = true;
+    }
+
+    /// Ends arbiters, each once. Before that `visit` is shown each with its number in the list, on all threads; beside that, one
+    /// thread takes the names out.
+    pub fn remove_many(&mut self, list: &[u32], pool: &mut StagePool, visit: impl Fn(usize, &Arbiter) + Sync) {
+        let (slots, awake) = (SharedSlice::new(&mut self.arbiters), SharedSlice::new(&mut self.awake));
+        let (by_key, lists, free) = (&mut self.by_key, &mut self.lists, &mut self.free);
+        let end = |block: usize| {
+            for (nth, &index) in list.iter().enumerate().skip(block * ENDS_PER_BLOCK).take(ENDS_PER_BLOCK) {
+                let arbiter = slots.at(index as usize);
+                // SAFETY: an arbiter stands in the list once, so nobody else writes it; and of what is written here, the thread
+                // that takes names out reads nothing.
+                unsafe {
+                    visit(nth, &*arbiter);
+                    ((*arbiter).alive, (*arbiter).awake) = (false, false);
+                    *awake.get_mut(index as usize) = ASLEEP;
+                }
+            }
+        };
+        // SAFETY: nobody writes keys in this stage.
+        let hash_of = |place: u32| unsafe { (*slots.at(place as usize)).key }.hash();
+        pool.run_beside(list.len().div_ceil(ENDS_PER_BLOCK), end, || {
+            for (nth, &index) in list.iter().enumerate() {
+                if let Some(&later) = list.get(nth + 2 * ENDS_AHEAD) {
+                    slots.prefetch(later as usize);
+                    lists.prefetch(later);
+                }
+                if let Some(&later) = list.get(nth + ENDS_AHEAD) {
+                    by_key.prefetch(hash_of(later));
+                }
+                let arbiter = slots.at(index as usize);
+                // SAFETY: nobody writes bodies in this stage.
+                let bodies = unsafe { [(*arbiter).body1.index, (*arbiter).body2.index] };
+                by_key.remove(hash_of(index), index, hash_of);
+                lists.unlink(index, bodies);
+                free.push(index);
+            }
+        });
         self.stale = true;
     }
 
@@ -400,43 +504,7 @@ impl ArbiterStore {
 
     /// Places of the arbiters of a body.
     pub fn of_body(&self, body: u32) -> impl Iterator<Item = u32> + '_ {
-        let first = self.heads.get(body as usize).copied().unwrap_or(NONE);
-        let mut edge = first;
-        std::iter::from_fn(move || {
-            if edge == NONE {
-                return None;
-            }
-            let index = edge >> 1;
-            edge = self.arbiters[index as usize].next[(edge & 1) as usize];
-            Some(index)
-        })
-    }
-
-    fn link(&mut self, index: u32, side: u32, body: u32) {
-        if self.heads.len() <= body as usize {
-            self.heads.resize(body as usize + 1, NONE);
-        }
-        let edge = index * 2 + side;
-        let head = std::mem::replace(&mut self.heads[body as usize], edge);
-        let arbiter = &mut self.arbiters[index as usize];
-        arbiter.next[side as usize] = head;
-        arbiter.previous[side as usize] = NONE;
-        if head != NONE {
-            self.arbiters[(head >> 1) as usize].previous[(head & 1) as usize] = edge;
-        }
-    }
-
-    fn unlink(&mut self, index: u32, side: u32, body: u32) {
-        let arbiter = &self.arbiters[index as usize];
-        let (next, previous) = (arbiter.next[side as usize], arbiter.previous[side as usize]);
-        if next != NONE {
-            self.arbiters[(next >> 1) as usize].previous[(next & 1) as usize] = previous;
-        }
-        if previous == NONE {
-            self.heads[body as usize] = next;
-        } else {
-            self.arbiters[(previous >> 1) as usize].next[(previous & 1) as usize] = next;
-        }
+        self.lists.of_body(body)
     }
 
     /// Checks every invariant; the message says which is broken.

@@ -109,6 +109,8 @@ pub struct BroadPhase {
     /// By leaf of the moving tree: its box in the last search; empty if it was not there, or a pair of it was dropped.
     seen: Vec<Aabb>,
     searches: u32,
+    /// Whether the trees are ready for the next search.
+    tight: bool,
     /// Kept for their memory.
     work: Vec<PairWork>,
     links: Vec<LinkPair>,
@@ -219,6 +221,23 @@ impl BroadPhase {
 
     /// Tightens the trees and cuts the search into about `parts` independent parts a pair of trees.
     pub fn prepare(&mut self, parts: usize) {
+        self.tighten();
+        self.tight = false;
+        let (mut work, mut links) = (std::mem::take(&mut self.work), std::mem::take(&mut self.links));
+        work.clear();
+        for between in [false, true] {
+            self.search(between).split(parts, &mut links);
+            work.extend(links.iter().map(|&links| PairWork { links, between }));
+        }
+        (self.work, self.links) = (work, links);
+    }
+
+    /// The first part of [`BroadPhase::prepare`], for one thread to do while others have better to do: tightens the trees.
+    /// Nothing may move between this and the search.
+    pub fn tighten(&mut self) {
+        if std::mem::replace(&mut self.tight, true) {
+            return;
+        }
         self.searches = self.searches.wrapping_add(1);
         let rebuild = self.searches.is_multiple_of(REBUILD_INTERVAL);
         for tree in [&mut self.fixed, &mut self.moving] {
@@ -230,13 +249,6 @@ impl BroadPhase {
                 tree.refit_marked();
             }
         }
-        let (mut work, mut links) = (std::mem::take(&mut self.work), std::mem::take(&mut self.links));
-        work.clear();
-        for between in [false, true] {
-            self.search(between).split(parts, &mut links);
-            work.extend(links.iter().map(|&links| PairWork { links, between }));
-        }
-        (self.work, self.links) = (work, links);
     }
 
     /// The parts of the search prepared.

@@ -59,13 +59,18 @@ impl PairSet {
         }
     }
 
+    /// Makes room for so many more pairs.
+    pub fn reserve(&mut self, count: usize) {
+        while (self.len + count) * 2 > self.keys.len() {
+            self.grow();
+        }
+    }
+
     /// Stores a value for a pair and returns the one it had before.
     pub fn insert(&mut self, a: u32, b: u32, value: u32) -> Option<u32> {
         let key = pair_key(a, b);
         debug_assert!(key != EMPTY, "the largest index cannot pair with itself");
-        if (self.len + 1) * 2 > self.keys.len() {
-            self.grow();
-        }
+        self.reserve(1);
         let slot = self.find(key);
         if self.keys[slot] == key {
             return Some(std::mem::replace(&mut self.values[slot], value));

@@ -178,6 +178,19 @@ impl StagePool {
         self.run_all(count, 0, |range| range.for_each(&stage));
     }
 
+    /// As [`Self::run`], while one of the threads does `beside` as well: work for one thread that has nothing to do with the
+    /// items, and would else leave the others without work. It comes first; a single thread does it before all items.
+    pub fn run_beside<F: Fn(usize) + Sync>(&mut self, count: usize, stage: F, beside: impl FnOnce() + Send) {
+        let beside = Mutex::new(Some(beside));
+        self.run(count + 1, |item| match item.checked_sub(1) {
+            Some(item) => stage(item),
+            None => {
+                let beside = beside.lock().unwrap_or_else(PoisonError::into_inner).take();
+                beside.into_iter().for_each(|work| work());
+            }
+        });
+    }
+
     /// Calls `stage` with runs of at least `least` items (but for the last of a share) that make up `0..count`, on all
     /// threads, and returns when all are done. A single thread gets all in one piece.
     pub fn run_ranges<F: Fn(Range<usize>) + Sync>(&mut self, count: usize, least: usize, stage: F) {
@@ -354,6 +367,22 @@ mod tests {
             }
         }
         assert_eq!(hits.load(Ordering::Relaxed), 300 * 5 * 7);
+    }
+
+    #[test]
+    fn what_is_done_beside_a_stage_is_done_once() {
+        for threads in [1, 2, 4] {
+            let mut pool = StagePool::new(threads);
+            for count in 0..200 {
+                let hits: Vec<AtomicU32> = (0..count).map(|_| AtomicU32::new(0)).collect();
+                let mut beside = 0;
+                let hit = |item: usize| {
+                    hits[item].fetch_add(1, Ordering::Relaxed);
+                };
+                pool.run_beside(count, hit, || beside += 1);
+                assert!(beside == 1 && hits.iter().all(|hit| hit.load(Ordering::Relaxed) == 1));
+            }
+        }
     }
 
     #[test]

@@ -13,9 +13,11 @@ use crate::arbiter::{
 use crate::error::{Error, finite_vec, unit_vec};
 use crate::id::BodyId;
 use crate::math::{Real, Rotation, Vec3, max};
+use crate::parallel::SharedSlice;
 use crate::shape::Shape;
 use crate::storage;
 use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Ids that one call may reserve.
 const ID_RANGE_LIMIT: u64 = 1 << 48;
@@ -160,15 +162,10 @@ impl World {
 
     /// Makes an arbiter whose begin is still to be raised, and wakes its bodies.
     pub(crate) fn create_arbiter(&mut self, key: ArbiterKey, body1: BodyId, body2: BodyId) -> u32 {
-        let index = self.create_blank_arbiter(key, body1, body2);
-        self.arbiters.at_mut(index).data = fresh_data();
-        index
-    }
-
-    /// The same, but that the caller has still to give it [`fresh_data`].
-    pub(crate) fn create_blank_arbiter(&mut self, key: ArbiterKey, body1: BodyId, body2: BodyId) -> u32 {
-        let index = self.arbiters.create_blank(key, body1, body2);
-        self.events.unbegun.push((key, self.arbiters.at(index).id));
+        let index = self.arbiters.create(key, body1, body2);
+        let arbiter = self.arbiters.at_mut(index);
+        arbiter.data = fresh_data();
+        self.events.unbegun.push((key, arbiter.id));
         self.wake(body1.index);
         self.wake(body2.index);
         index
@@ -179,14 +176,7 @@ impl World {
         let arbiter = self.arbiters.at(index);
         let (b1, b2, pair) = (arbiter.body1.index, arbiter.body2.index, arbiter.pair);
         if arbiter.begun {
-            let event = EndEvent {
-                arbiter: arbiter.id,
-                key: arbiter.key,
-                body1: arbiter.body1,
-                body2: arbiter.body2,
-                reason,
-                data: arbiter.data,
-            };
+            let event = EndEvent::of(arbiter, reason);
             storage::push(&mut self.events.pending_ends, event);
         }
         if pair == NONE {
@@ -196,15 +186,44 @@ impl World {
             self.pairs[pair as usize].has_manifold = false;
         }
         self.arbiters.remove(index);
-        if reason != EndReason::Separated || !self.both_awake(b1, b2) {
+        if reason != EndReason::Separated || !both_awake(&self.bodies, [b1, b2]) {
             self.wake(b1);
             self.wake(b2);
         }
     }
 
-    fn both_awake(&self, a: u32, b: u32) -> bool {
-        let rests = |index: u32| self.bodies[index as usize].is_dynamic() && !self.bodies[index as usize].awake;
-        !rests(a) && !rests(b)
+    /// Ends arbiters whose shapes have separated, each once.
+    pub(crate) fn end_separated(&mut self, list: &[u32]) {
+        let is_plain = |&index: &u32| self.arbiters.at(index).begun && self.arbiters.at(index).pair != NONE;
+        if list.is_empty() || !list.iter().all(is_plain) {
+            list.iter().for_each(|&index| self.end_arbiter(index, EndReason::Separated));
+            return;
+        }
+        let events = &mut self.events.pending_ends;
+        let (first, count) = (events.len(), events.len() + list.len());
+        storage::reserve(events, count);
+        let told = SharedSlice::new(&mut events.spare_capacity_mut()[..list.len()]);
+        let (pairs, bodies, rests) = (SharedSlice::new(&mut self.pairs), &self.bodies, AtomicBool::new(false));
+        self.arbiters.remove_many(list, &mut self.pool, |nth, arbiter| {
+            // SAFETY: each arbiter has its number, and its pair.
+            let (event, pair) = unsafe { (told.get_mut(nth), pairs.get_mut(arbiter.pair as usize)) };
+            event.write(EndEvent::of(arbiter, EndReason::Separated));
+            (pair.arbiter, pair.has_manifold) = (NONE, false);
+            if !both_awake(bodies, [arbiter.body1.index, arbiter.body2.index]) {
+                rests.store(true, Ordering::Relaxed);
+            }
+        });
+        // SAFETY: an event has been written for each.
+        unsafe { events.set_len(count) };
+        if rests.into_inner() {
+            for nth in first..count {
+                let event = &self.events.pending_ends[nth];
+                let pair = [event.body1.index, event.body2.index];
+                if !both_awake(&self.bodies, pair) {
+                    pair.into_iter().for_each(|body| self.wake(body));
+                }
+            }
+        }
     }
 
     /// Clears the cached contacts of a body: its anchors no longer hold.
@@ -260,6 +279,11 @@ impl World {
             }
         }
     }
+}
+
+/// Whether neither body is a dynamic one that sleeps.
+fn both_awake(bodies: &[Body], pair: [u32; 2]) -> bool {
+    pair.into_iter().all(|index| !bodies[index as usize].is_dynamic() || bodies[index as usize].awake)
 }
 
 /// Data of an arbiter that begins.

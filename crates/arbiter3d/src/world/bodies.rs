@@ -44,8 +44,6 @@ pub(crate) struct Body {
     pub shapes: Vec<ShapeId>,
     /// Places of the shapes.
     pub shape_slots: Vec<u32>,
-    /// First broad-phase pair, as `pair * 2 + side`.
-    pub first_pair: u32,
     pub user_data: u128,
 }
 
@@ -66,6 +64,16 @@ impl Body {
 
     pub fn is_dynamic(&self) -> bool {
         self.kind == BodyKind::Dynamic
+    }
+
+    /// Whether waking the body may change anything: it sleeps, or has begun to rest.
+    #[inline(always)]
+    pub fn can_wake(&self) -> bool {
+        match self.kind {
+            BodyKind::Static => false,
+            BodyKind::Kinematic => !self.awake,
+            BodyKind::Dynamic => !self.awake || self.island != NONE || self.sleep_time != 0.0,
+        }
     }
 
     pub fn new(generation: u32) -> Self {
@@ -93,7 +101,6 @@ impl Body {
             extents: Vec3::ZERO,
             shapes: Vec::new(),
             shape_slots: Vec::new(),
-            first_pair: NONE,
             user_data: 0,
         }
     }

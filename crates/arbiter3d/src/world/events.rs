@@ -14,7 +14,11 @@ use crate::arbiter::{Arbiter, ArbiterId, ArbiterKey, ContactData, ContactPoint, 
 use crate::error::Error;
 use crate::id::{BodyId, ShapeId};
 use crate::math::{Aabb, Real};
+use crate::parallel::SharedSlice;
 use crate::storage::{self, Peak};
+
+/// Events that a thread copies at a time at least.
+const LEAST_EVENTS: usize = 64;
 
 /// An arbiter has begun.
 ///
@@ -58,6 +62,19 @@ pub struct EndEvent {
     pub reason: EndReason,
     /// Its contacts and material at the end.
     pub data: ContactData,
+}
+
+impl EndEvent {
+    pub(crate) fn of(arbiter: &Arbiter, reason: EndReason) -> Self {
+        Self {
+            arbiter: arbiter.id,
+            key: arbiter.key,
+            body1: arbiter.body1,
+            body2: arbiter.body2,
+            reason,
+            data: arbiter.data,
+        }
+    }
 }
 
 /// A shape has entered or left a sensor.
@@ -494,6 +511,22 @@ impl World {
         self.flush_events();
     }
 
+    /// Puts a batch of ends into the list in a given order, on all threads: they are large.
+    fn note_ends(&mut self, batch: &[EndEvent], order: &[(ArbiterKey, ArbiterId, u32)]) {
+        let events = &mut self.events.end.events;
+        let count = events.len() + order.len();
+        storage::reserve(events, count);
+        let places = SharedSlice::new(&mut events.spare_capacity_mut()[..order.len()]);
+        self.pool.run_ranges(order.len(), LEAST_EVENTS, |range| {
+            for nth in range {
+                // SAFETY: each place belongs to one run.
+                unsafe { places.get_mut(nth) }.write(batch[order[nth].2 as usize]);
+            }
+        });
+        // SAFETY: all of them have been written.
+        unsafe { events.set_len(count) };
+    }
+
     /// Calls the listeners of all ends and carries out the removals they and others have asked for, until none is left.
     pub(crate) fn flush_events(&mut self) {
         loop {
@@ -504,16 +537,18 @@ impl World {
                 let mut order = std::mem::take(&mut self.events.end_order);
                 order.extend((0..).zip(&batch).map(|(place, event)| (event.key, event.arbiter, place)));
                 order.sort_unstable();
-                let heard = !self.listeners.are_deaf_to_ends();
-                for (.., place) in order.drain(..) {
-                    let event = &batch[place as usize];
-                    storage::push(&mut self.events.end.events, *event);
-                    if heard {
+                if self.listeners.are_deaf_to_ends() {
+                    self.note_ends(&batch, &order);
+                } else {
+                    for &(.., place) in &order {
+                        let event = &batch[place as usize];
+                        storage::push(&mut self.events.end.events, *event);
                         let mut listeners = std::mem::take(&mut self.listeners);
                         listeners.end(&mut StepContext::new(self), event);
                         self.listeners = listeners;
                     }
                 }
+                order.clear();
                 self.events.end_order = order;
                 batch.clear();
                 self.events.spare_ends = batch;

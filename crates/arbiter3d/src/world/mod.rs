@@ -31,6 +31,7 @@ pub use timings::{Phase, Timings};
 
 use crate::arbiter::{ArbiterStore, EndReason, NONE};
 use crate::broad_phase::{BroadPhase, PairSet};
+use crate::edge_lists::EdgeLists;
 use crate::error::unit_rotation;
 use crate::island::{IslandFinder, SleepingIslands};
 use crate::math::{Pose, Real};
@@ -84,6 +85,8 @@ pub struct World {
     broad_phase: BroadPhase,
     pairs: Vec<pairs::Pair>,
     free_pairs: Vec<u32>,
+    /// The pairs of each body.
+    pair_lists: EdgeLists,
     pair_set: PairSet,
     active_pairs: pairs::PlaceSet,
     arbiters: ArbiterStore,
@@ -106,6 +109,8 @@ pub struct World {
     /// Where fast bodies stop.
     stops: Vec<Option<Pose>>,
     member_scratch: Vec<(u32, u32)>,
+    /// Bodies of new pairs, and whether one is awake.
+    tie_scratch: Vec<([u32; 2], bool)>,
 }
 
 impl std::fmt::Debug for World {
@@ -156,6 +161,7 @@ impl World {
             broad_phase: BroadPhase::new(),
             pairs: Vec::new(),
             free_pairs: Vec::new(),
+            pair_lists: EdgeLists::default(),
             pair_set: PairSet::new(),
             active_pairs: pairs::PlaceSet::default(),
             arbiters: ArbiterStore::new(tag),
@@ -177,6 +183,7 @@ impl World {
             index_scratch: Vec::new(),
             stops: Vec::new(),
             member_scratch: Vec::new(),
+            tie_scratch: Vec::new(),
         };
         world.solver_bodies.push();
         world.refresh_solver_body(0);

@@ -1,19 +1,24 @@
 //! Broad-phase pairs: two shapes whose fat boxes overlap, from when they come near until they part.
 //!
 //! A pair remembers what the narrow phase may use again: its arbiter, the last separating feature, and the relative pose at
-//! the last full manifold. The pairs of a body hang on a doubly linked list through the records; those with an awake body
-//! stand in `active_pairs`, listed in the order of their places: the narrow phase walks them through memory in one direction,
-//! whatever has come and gone.
+//! the last full manifold. Those with an awake body stand in `active_pairs`, listed in the order of their places: the narrow
+//! phase walks them through memory in one direction, whatever has come and gone.
+//!
+//! New pairs are made together: all threads write their records, beside which one enters them in the set of pairs; then they
+//! are hung on the lists of their bodies.
 
 use super::World;
+use super::bodies::Body;
 use super::definition::BodyKind;
 use super::shapes::ShapeSlot;
 use crate::arbiter::{EndReason, NONE};
 use crate::math::{Pose, Real, Rotation, Vec3, max, min};
 use crate::narrow_phase::PairCache;
+use crate::parallel::SharedSlice;
 use crate::shape::Shape;
 use crate::simd::{Quad, prefetch};
 use crate::storage;
+use std::mem::MaybeUninit;
 
 /// What the world keeps of a pair. Shape 1 has the smaller id.
 #[derive(Clone, Debug)]
@@ -48,12 +53,14 @@ pub(crate) struct Pair {
     /// How far a pair with contacts may move until then, metres.
     touch_distance: Real,
     pub cache: PairCache,
-    next: [u32; 2],
-    previous: [u32; 2],
 }
 
 /// How many pairs ahead of its end what a pair touches is asked for.
 const PARTED_AHEAD: usize = 4;
+/// The same for pairs that are made.
+const FOUND_AHEAD: usize = 6;
+/// New pairs that a thread makes at a time.
+const NEW_PER_BLOCK: usize = 16;
 
 /// How far a pair may move, in shares of the smaller shape's inner radius, before its manifold is made anew.
 const REUSE_TRANSLATION: Real = 0.02;
@@ -194,23 +201,32 @@ impl PairRules<'_> {
     }
 }
 
-impl World {
-    /// Makes a pair of two shapes that have none yet.
-    pub(crate) fn add_pair(&mut self, a: u32, b: u32) {
+/// What a new pair is made of.
+struct PairMaker<'a> {
+    shapes: &'a [ShapeSlot],
+    bodies: &'a [Body],
+    speculative_distance: Real,
+}
+
+impl PairMaker<'_> {
+    fn make(&self, (a, b): (u32, u32)) -> Pair {
         let smaller_first = self.shapes[a as usize].id < self.shapes[b as usize].id;
         let shapes = if smaller_first { [a, b] } else { [b, a] };
-        let bodies = shapes.map(|slot| self.shapes[slot as usize].body);
-        let reach = |side: usize| self.shapes[shapes[side] as usize].reach;
-        let size = self.smaller_radius(shapes);
-        let cuboids = shapes.iter().all(|&slot| matches!(self.shapes[slot as usize].geometry, Shape::Cuboid(_)));
-        let pair = Pair {
+        let slots = shapes.map(|slot| &self.shapes[slot as usize]);
+        let bodies = slots.map(|shape| shape.body);
+        let size = match slots.map(|shape| shape.geometry.inner_radius()) {
+            [a, b] if a > 0.0 && b > 0.0 => min(a, b),
+            [a, b] => max(a, b), // a mesh has no inside
+        };
+        let cuboids = slots.iter().all(|shape| matches!(shape.geometry, Shape::Cuboid(_)));
+        Pair {
             shapes,
             bodies,
             arbiter: NONE,
             alive: true,
-            active: false,
-            sensor: shapes.iter().any(|&slot| self.shapes[slot as usize].sensor),
-            conveyor: shapes.iter().any(|&slot| self.shapes[slot as usize].material.tangent_velocity != Vec3::ZERO),
+            active: bodies.iter().any(|&body| self.bodies[body as usize].awake),
+            sensor: slots.iter().any(|shape| shape.sensor),
+            conveyor: slots.iter().any(|shape| shape.material.tangent_velocity != Vec3::ZERO),
             overlapping: false,
             has_manifold: false,
             manifold_pose: Pose::IDENTITY,
@@ -218,31 +234,80 @@ impl World {
             manifold_middle: Vec3::ZERO,
             size,
             touch_distance: size * if cuboids { REUSE_CUBOIDS } else { REUSE_TRANSLATION },
-            apart_rotation: self.scaled.speculative_distance / (8.0 * min(reach(0), reach(1))),
+            apart_rotation: self.speculative_distance / (8.0 * min(slots[0].reach, slots[1].reach)),
             cache: PairCache::default(),
-            next: [NONE; 2],
-            previous: [NONE; 2],
-        };
-        let index = if let Some(index) = self.free_pairs.pop() {
-            self.pairs[index as usize] = pair;
-            index
-        } else {
-            storage::push(&mut self.pairs, pair);
-            (self.pairs.len() - 1) as u32
-        };
-        self.pair_set.insert(a, b, index);
-        self.link_pair(index, 0);
-        self.link_pair(index, 1);
-        if bodies.iter().any(|&body| self.bodies[body as usize].awake) {
-            self.activate_pair(index);
         }
     }
 
-    fn smaller_radius(&self, shapes: [u32; 2]) -> Real {
-        match shapes.map(|slot| self.shapes[slot as usize].geometry.inner_radius()) {
-            [a, b] if a > 0.0 && b > 0.0 => min(a, b),
-            [a, b] => max(a, b), // a mesh has no inside
+    /// Asks for what the pair of two shapes is made of, their bodies once the shapes are there.
+    fn prefetch(&self, found: &[(u32, u32)], at: usize) {
+        if let Some(&(a, b)) = found.get(at + 2 * FOUND_AHEAD) {
+            [a, b].into_iter().for_each(|slot| prefetch(&self.shapes[slot as usize]));
         }
+        if let Some(&(a, b)) = found.get(at + FOUND_AHEAD) {
+            for slot in [a, b] {
+                prefetch(&self.bodies[self.shapes[slot as usize].body as usize].awake);
+            }
+        }
+    }
+}
+
+impl World {
+    /// Makes pairs of shapes that have none yet.
+    pub(crate) fn add_pairs(&mut self, found: &[(u32, u32)]) {
+        if found.is_empty() {
+            return;
+        }
+        let (old, reused) = (self.pairs.len(), self.free_pairs.len().min(found.len()));
+        let count = old + found.len() - reused;
+        storage::reserve(&mut self.pairs, count);
+        self.pair_set.reserve(found.len());
+        let mut ties = std::mem::take(&mut self.tie_scratch);
+        ties.clear();
+        ties.resize(found.len(), ([0; 2], false));
+        let free = &self.free_pairs[..];
+        let place_of = |nth: usize| if nth < reused { free[free.len() - 1 - nth] } else { (old + nth - reused) as u32 };
+        let maker = PairMaker {
+            shapes: &self.shapes,
+            bodies: &self.bodies,
+            speculative_distance: self.scaled.speculative_distance,
+        };
+        // SAFETY: there is room for so many; what is not a pair yet is only written.
+        let places =
+            unsafe { std::slice::from_raw_parts_mut(self.pairs.as_mut_ptr().cast::<MaybeUninit<Pair>>(), count) };
+        let (places, told, set) = (SharedSlice::new(places), SharedSlice::new(&mut ties), &mut self.pair_set);
+        let make = |block: usize| {
+            let first = block * NEW_PER_BLOCK;
+            for (nth, &pair) in found.iter().enumerate().skip(first).take(NEW_PER_BLOCK) {
+                maker.prefetch(found, nth);
+                let pair = maker.make(pair);
+                // SAFETY: each has a place of its own, and belongs to one block.
+                unsafe {
+                    *told.get_mut(nth) = (pair.bodies, pair.active);
+                    places.get_mut(place_of(nth) as usize).write(pair);
+                }
+            }
+        };
+        self.pool.run_beside(found.len().div_ceil(NEW_PER_BLOCK), make, || {
+            for (nth, &(a, b)) in found.iter().enumerate() {
+                if let Some(&(a, b)) = found.get(nth + FOUND_AHEAD) {
+                    set.prefetch(a, b);
+                }
+                set.insert(a, b, place_of(nth));
+            }
+        });
+        // SAFETY: old pairs keep their places, and each new place has been written.
+        unsafe { self.pairs.set_len(count) };
+        self.pair_lists.grow(count, self.bodies.len());
+        for (nth, &(bodies, active)) in ties.iter().enumerate() {
+            let place = place_of(nth);
+            self.pair_lists.link(place, bodies);
+            if active {
+                self.active_pairs.insert(place);
+            }
+        }
+        self.free_pairs.truncate(self.free_pairs.len() - reused);
+        self.tie_scratch = ties;
     }
 
     /// Ends a pair: its arbiter ends for `reason`, a sensor's overlap ends too.
@@ -258,16 +323,11 @@ impl World {
         for (at, &index) in list.iter().enumerate() {
             if let Some(&later) = list.get(at + 2 * PARTED_AHEAD) {
                 prefetch(&self.pairs[later as usize].shapes);
-                prefetch(&self.pairs[later as usize].next);
+                self.pair_lists.prefetch(later);
             }
             if let Some(&later) = list.get(at + PARTED_AHEAD) {
                 let pair = &self.pairs[later as usize];
                 self.pair_set.prefetch(pair.shapes[0], pair.shapes[1]);
-                for edge in pair.next.into_iter().chain(pair.previous) {
-                    if let Some(neighbour) = self.pairs.get((edge >> 1) as usize) {
-                        prefetch(&neighbour.next);
-                    }
-                }
             }
             self.drop_pair(index, EndReason::Separated);
         }
@@ -275,7 +335,7 @@ impl World {
 
     fn drop_pair(&mut self, index: u32, reason: EndReason) {
         let pair = &self.pairs[index as usize];
-        let (shapes, arbiter, overlapping) = (pair.shapes, pair.arbiter, pair.overlapping);
+        let (shapes, bodies, arbiter, overlapping) = (pair.shapes, pair.bodies, pair.arbiter, pair.overlapping);
         if arbiter != NONE {
             self.end_arbiter(arbiter, reason);
         }
@@ -283,8 +343,7 @@ impl World {
             self.set_sensor_overlap(index, false);
         }
         self.deactivate_pair(index);
-        self.unlink_pair(index, 0);
-        self.unlink_pair(index, 1);
+        self.pair_lists.unlink(index, bodies);
         self.pair_set.remove(shapes[0], shapes[1]);
         self.pairs[index as usize].alive = false;
         self.free_pairs.push(index);
@@ -292,15 +351,7 @@ impl World {
 
     /// The pairs of a body.
     pub(crate) fn pairs_of_body(&self, body: u32) -> impl Iterator<Item = u32> + '_ {
-        let mut edge = self.bodies[body as usize].first_pair;
-        std::iter::from_fn(move || {
-            if edge == NONE {
-                return None;
-            }
-            let index = edge >> 1;
-            edge = self.pairs[index as usize].next[(edge & 1) as usize];
-            Some(index)
-        })
+        self.pair_lists.of_body(body)
     }
 
     pub(crate) fn activate_pair(&mut self, index: u32) {
@@ -311,30 +362,6 @@ impl World {
     pub(crate) fn deactivate_pair(&mut self, index: u32) {
         if std::mem::take(&mut self.pairs[index as usize].active) {
             self.active_pairs.remove(index);
-        }
-    }
-
-    fn link_pair(&mut self, index: u32, side: usize) {
-        let body = self.pairs[index as usize].bodies[side] as usize;
-        let edge = index * 2 + side as u32;
-        let head = std::mem::replace(&mut self.bodies[body].first_pair, edge);
-        let pair = &mut self.pairs[index as usize];
-        (pair.next[side], pair.previous[side]) = (head, NONE);
-        if head != NONE {
-            self.pairs[(head >> 1) as usize].previous[(head & 1) as usize] = edge;
-        }
-    }
-
-    fn unlink_pair(&mut self, index: u32, side: usize) {
-        let pair = &self.pairs[index as usize];
-        let (next, previous, body) = (pair.next[side], pair.previous[side], pair.bodies[side]);
-        if next != NONE {
-            self.pairs[(next >> 1) as usize].previous[(next & 1) as usize] = previous;
-        }
-        if previous == NONE {
-            self.bodies[body as usize].first_pair = next;
-        } else {
-            self.pairs[(previous >> 1) as usize].next[(previous & 1) as usize] = next;
         }
     }
 }

@@ -5,13 +5,12 @@ use super::bodies::world_inverse_inertia;
 use super::collide::shapes_overlap;
 use super::pairs::PairRules;
 use super::timings::{Phase, PhaseClock, Timings};
-use crate::arbiter::{EndReason, Entry, NONE};
+use crate::arbiter::{Entry, NONE};
 use crate::broad_phase::Boxes;
 use crate::error::{Error, in_range};
 use crate::id::BodyId;
 use crate::math::{Aabb, Real, Vec3, min};
 use crate::parallel::{BlockList, Gather, SharedSlice};
-use crate::simd::prefetch;
 use crate::solver::{
     BodyMass, BodyMotion, BodyState, IntegrateParameters, IntegrateTarget, Integration, Pass, PassParameters,
     PrepareContext, Softness, StoreTarget,
@@ -23,6 +22,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 const DEEPEST_REST: Real = 1.97;
 /// Bodies that a thread takes at a time at least: of many shapes each, a few are much work.
 const LEAST_BODIES: usize = 8;
+/// Bodies whose forces a thread looks at at a time.
+const BODIES_PER_BLOCK: usize = 64;
 /// Room in the lists that threads fill, at first.
 const ROOM: usize = 64;
 
@@ -32,11 +33,6 @@ const ROWS_PER_BLOCK: usize = 512;
 const EMPTY_PER_BLOCK: usize = 16;
 /// Parts of the search for pairs for each thread: they differ in size.
 const PARTS_PER_THREAD: usize = 16;
-
-/// How many pairs ahead of its making what a pair touches is asked for.
-const FOUND_AHEAD: usize = 6;
-/// The same for arbiters that end.
-const BROKEN_AHEAD: usize = 4;
 
 /// Awake bodies, pairs and arbiters from which on a step uses several threads: below, waiting for each other costs more.
 const WORK_FOR_THREADS: usize = 1500;
@@ -173,7 +169,8 @@ impl World {
             && self.events.are_told()
     }
 
-    /// Lists the awake bodies and turns gravity and their forces into this step's accelerations.
+    /// Lists the awake bodies and turns gravity and their forces into this step's accelerations; beside that, the trees are
+    /// made ready for the search.
     fn apply_forces(&mut self) {
         if std::mem::take(&mut self.awake_changed) {
             let list = &mut self.scratch.sorted_awake;
@@ -186,13 +183,20 @@ impl World {
         let states = SharedSlice::new(&mut self.solver_bodies.states);
         let motions = SharedSlice::new(&mut self.solver_bodies.motions);
         let masses = &self.solver_bodies.masses;
-        self.pool.run_ranges(awake.len(), LEAST_BODIES, |range| {
-            for &body in &awake[range] {
+        let (blocks, broad_phase) = (awake.len().div_ceil(BODIES_PER_BLOCK), &mut self.broad_phase);
+        let accelerate_block = |block: usize| {
+            let start = block * BODIES_PER_BLOCK;
+            for &body in &awake[start..(start + BODIES_PER_BLOCK).min(awake.len())] {
                 let index = body as usize;
                 // SAFETY: a body stands in the list once.
                 let (body, state, motion) =
                     unsafe { (bodies.get_mut(index), states.get_mut(index), motions.get_mut(index)) };
                 accelerate(body, (state, motion, &masses[index]), gravity);
+            }
+        };
+        self.pool.run_beside(blocks, accelerate_block, || {
+            if broad_phase.has_moved() {
+                broad_phase.tighten();
             }
         });
     }
@@ -225,30 +229,10 @@ impl World {
         }
         let mut found = std::mem::take(&mut self.scratch.pairs);
         self.search_pairs(&mut found);
-        for (at, &(a, b)) in found.iter().enumerate() {
-            if let Some(&(a, b)) = found.get(at + 2 * FOUND_AHEAD) {
-                [a, b].into_iter().for_each(|slot| prefetch(&self.shapes[slot as usize]));
-            }
-            if let Some(&(a, b)) = found.get(at + FOUND_AHEAD) {
-                self.prefetch_pair(a, b);
-            }
-            if self.passes_pair_filter(a, b) {
-                self.add_pair(a, b);
-            }
-        }
+        found.retain(|&(a, b)| self.passes_pair_filter(a, b));
+        self.add_pairs(&found);
         found.clear();
         self.scratch.pairs = found;
-    }
-
-    /// Asks for what a new pair of two shapes will touch.
-    fn prefetch_pair(&self, a: u32, b: u32) {
-        self.pair_set.prefetch(a, b);
-        for slot in [a, b] {
-            let body = &self.bodies[self.shapes[slot as usize].body as usize];
-            prefetch(&body.awake);
-            prefetch(&body.first_pair);
-            prefetch(&body.reach);
-        }
     }
 
     /// The pairs that are new, sorted.
@@ -450,15 +434,7 @@ impl World {
         empty.sort_unstable();
         empty.dedup();
         self.keep_overlapping(&mut empty);
-        for (at, &index) in empty.iter().enumerate() {
-            if let Some(&later) = empty.get(at + 2 * BROKEN_AHEAD) {
-                self.arbiters.prefetch_links(later);
-            }
-            if let Some(&later) = empty.get(at + BROKEN_AHEAD) {
-                self.arbiters.prefetch_end(later);
-            }
-            self.end_arbiter(index, EndReason::Separated);
-        }
+        self.end_separated(&empty);
         empty.clear();
         self.narrow.empty = empty;
     }

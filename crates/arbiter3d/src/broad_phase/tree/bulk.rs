@@ -139,6 +139,19 @@ impl DynamicTree {
         self.order.many_marked = true;
     }
 
+    /// Whether leaves have been lifted together since the marks were forgotten.
+    pub(super) fn has_many_marks(&self) -> bool {
+        self.order.many_marked
+    }
+
+    /// Lists the nodes anew after a rebuild of a tree with many marks.
+    pub(super) fn list_many_marked(&mut self) {
+        if !self.root.is_leaf() && self.order.is_stale() {
+            self.order.list(&self.nodes, self.root.index() as u32);
+        }
+        self.order.many_marked = !self.order.is_stale();
+    }
+
     /// Forgets all marks, and calls `visit` with each marked leaf and its box.
     pub fn clear_marks(&mut self, visit: impl Fn(usize, &Aabb) + Sync, pool: Option<&mut StagePool>) {
         if self.is_empty() {

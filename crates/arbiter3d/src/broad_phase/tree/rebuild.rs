@@ -60,8 +60,12 @@ impl DynamicTree {
     /// This has a mark of its own: a leaf that moves every eighth step would else meet only refits and never a rebuild.
     pub fn rebuild_loose(&mut self) {
         if !self.is_empty() && self.root.is_loose() {
+            let many_marked = self.has_many_marks();
             self.rebuild_where(Link::is_loose, Split::Middle);
             self.limit_height();
+            if many_marked {
+                self.list_many_marked();
+            }
         }
     }
 

@@ -381,7 +381,8 @@ impl<W: Lanes<L>, const L: usize> BlockKernel<'_, W, L> {
         } else if context.begins(pair, places) {
             let [id1, id2] = pair.shapes.map(|slot| context.shapes[slot as usize].id);
             let (key, bodies) = (ArbiterKey::of_shapes(id1, id2), pair.bodies);
-            self.begins.push(Begin { key, pair: item.pair, bodies, arbiter: NONE, is_new: false, places: *places });
+            let wakes = bodies.iter().any(|&body| context.bodies[body as usize].can_wake());
+            self.begins.push(Begin { key, pair: item.pair, bodies, wakes, places: *places });
         }
     }
 }

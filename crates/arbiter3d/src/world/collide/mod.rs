@@ -20,22 +20,22 @@ use super::filters::UserFilters;
 use super::pairs::Pair;
 use super::settings::WorldSettings;
 use super::shapes::ShapeSlot;
-use crate::arbiter::{ArbiterKey, NONE};
+use crate::arbiter::{Arbiter, ArbiterId, ArbiterKey, ContactData, NONE, Name};
+use crate::id::BodyId;
 use crate::math::Real;
 use crate::narrow_phase::{Manifold, collide};
 use crate::parallel::{Gather, SharedSlice};
 #[cfg(target_arch = "x86_64")]
 use crate::simd::{Avx2, Avx2Lanes, Avx512, Avx512Lanes, Sse2Lanes};
-use crate::simd::{Baseline, Instructions, Lanes, SimdLevel, Wide, prefetch};
-use crate::solver::SolverBodies;
+use crate::simd::{Baseline, Instructions, Lanes, SimdLevel, Wide};
+use crate::solver::{BodyMass, SolverBodies};
+use crate::storage;
 use block::{BlockKernel, PAIRS_PER_BLOCK, WORDS_PER_BLOCK};
 use contacts::{Places, update_contacts};
 use std::marker::PhantomData;
 
-/// How many begins ahead of its making what an arbiter touches is asked for.
-const BEGINS_AHEAD: usize = 8;
-/// Arbiters that a thread fills at a time at least.
-const LEAST_BEGINS: usize = 32;
+/// How many begins ahead of its making the pair of an arbiter is asked for.
+const BEGINS_AHEAD: usize = 4;
 
 /// What a pair has to tell beyond its own records.
 #[derive(Clone, Copy, Debug)]
@@ -54,10 +54,8 @@ struct Begin {
     key: ArbiterKey,
     pair: u32,
     bodies: [u32; 2],
-    /// Once it is made.
-    arbiter: u32,
-    /// Whether the user had not made it before.
-    is_new: bool,
+    /// Whether a body of it sleeps, or has begun to rest.
+    wakes: bool,
     places: Places,
 }
 
@@ -175,64 +173,101 @@ impl World {
         ArbiterKey::of_shapes(a, b)
     }
 
-    /// Makes the arbiters of the pairs that begin to touch, by key, then fills them on all threads.
+    /// Makes the arbiters of the pairs that begin to touch, by key.
     fn begin_pairs(&mut self, begins: &mut Vec<Begin>, order: &mut Vec<(ArbiterKey, u32)>) {
         order.extend(begins.iter().zip(0..).map(|(begin, place)| (begin.key, place)));
         order.sort_unstable();
-        for (at, &(_, place)) in order.iter().enumerate() {
-            if let Some(&(key, later)) = order.get(at + BEGINS_AHEAD) {
-                let later = &begins[later as usize];
-                prefetch(&self.pairs[later.pair as usize].arbiter);
-                for body in later.bodies {
-                    prefetch(&self.bodies[body as usize].island);
-                    prefetch(&self.bodies[body as usize].awake);
-                }
-                self.arbiters.prefetch_new(key, later.bodies, BEGINS_AHEAD);
-            }
-            self.begin_pair(&mut begins[place as usize]);
+        // The engine's own arbiters end with their pairs: only one of the user's can have a key already.
+        if self.arbiters.custom > 0 {
+            order.retain(|&(_, place)| !self.take_over(&begins[place as usize]));
+        }
+        if !order.is_empty() {
+            self.create_arbiters(begins, order);
+        }
+        for begin in order.iter().map(|&(_, place)| &begins[place as usize]).filter(|begin| begin.wakes) {
+            begin.bodies.into_iter().for_each(|body| self.wake(body));
         }
         order.clear();
-        self.fill_arbiters(begins);
         begins.clear();
     }
 
-    /// Makes the arbiter of a pair that begins to touch, without contacts.
-    fn begin_pair(&mut self, begin: &mut Begin) {
+    /// Whether the key of a pair that begins to touch is in use. If the user has made an arbiter under it between the same
+    /// bodies, the engine goes on with that one.
+    fn take_over(&mut self, begin: &Begin) -> bool {
+        let Some(index) = self.arbiters.find(begin.key) else { return false };
         let ids = begin.bodies.map(|body| self.body_id(body));
-        // The engine's own arbiters end with their pairs: only one of the user's can have the key already.
-        let present = if self.arbiters.custom > 0 { self.arbiters.find(begin.key) } else { None };
-        begin.is_new = present.is_none();
-        begin.arbiter = match present {
-            None => self.create_blank_arbiter(begin.key, ids[0], ids[1]),
-            // The user has made an arbiter under the key of these shapes: it is theirs from now on.
-            Some(index) if [self.arbiters.at(index).body1, self.arbiters.at(index).body2] == ids => index,
-            Some(_) => return, // a key that was not reserved, in use between other bodies
-        };
-        self.arbiters.at_mut(begin.arbiter).pair = begin.pair;
-        self.pairs[begin.pair as usize].arbiter = begin.arbiter;
+        let arbiter = self.arbiters.at_mut(index);
+        if [arbiter.body1, arbiter.body2] == ids {
+            let filler = Filler {
+                shapes: &self.shapes,
+                bodies: &self.bodies,
+                masses: &self.solver_bodies.masses,
+                break_distance: self.scaled.contact_break_distance,
+                reusable: self.filters.contact.is_none(),
+            };
+            let pair = &mut self.pairs[begin.pair as usize];
+            (arbiter.pair, pair.arbiter) = (begin.pair, index);
+            filler.fill(begin, pair, &mut arbiter.data);
+        }
+        true
     }
 
-    /// Gives contacts and materials to the arbiters just made.
-    fn fill_arbiters(&mut self, begins: &[Begin]) {
-        let reusable = self.filters.contact.is_none();
-        let (shapes, bodies, masses) = (&self.shapes, &self.bodies, &self.solver_bodies.masses);
-        let break_distance = self.scaled.contact_break_distance;
+    /// Makes arbiters with contacts and materials, their begins still to be raised.
+    fn create_arbiters(&mut self, begins: &[Begin], order: &[(ArbiterKey, u32)]) {
+        let filler = Filler {
+            shapes: &self.shapes,
+            bodies: &self.bodies,
+            masses: &self.solver_bodies.masses,
+            break_distance: self.scaled.contact_break_distance,
+            reusable: self.filters.contact.is_none(),
+        };
+        let first = self.events.unbegun.len();
+        storage::reserve(&mut self.events.unbegun, first + order.len());
+        self.events
+            .unbegun
+            .resize(first + order.len(), (ArbiterKey::new(0, 0), ArbiterId { index: NONE, generation: 0 }));
+        let unbegun = SharedSlice::new(&mut self.events.unbegun[first..]);
         let pairs = SharedSlice::new(&mut self.pairs);
-        let arbiters = SharedSlice::new(self.arbiters.slots_mut());
-        self.pool.run_ranges(begins.len(), LEAST_BEGINS, |range| {
-            for begin in begins[range].iter().filter(|begin| begin.arbiter != NONE) {
-                // SAFETY: a pair begins once, and an arbiter belongs to one pair.
-                let (pair, arbiter) =
-                    unsafe { (pairs.get_mut(begin.pair as usize), arbiters.get_mut(begin.arbiter as usize)) };
-                if begin.is_new {
-                    arbiter.data = fresh_data();
-                }
-                let rotations = begin.bodies.map(|body| masses[body as usize].rotation);
-                update_contacts(&mut arbiter.data, &begin.places, rotations, break_distance);
-                pair.has_manifold = reusable;
-                mix_shape_materials(pair, &mut arbiter.data, shapes, bodies);
+        let name_of = |nth: usize| {
+            let (key, place) = order[nth];
+            let bodies = begins[place as usize].bodies;
+            Name {
+                key,
+                bodies: bodies.map(|index| BodyId { index, generation: filler.bodies[index as usize].generation }),
             }
-        });
+        };
+        let fill = |nth: usize, arbiter: &mut Arbiter| {
+            if let Some(&(_, later)) = order.get(nth + BEGINS_AHEAD) {
+                pairs.prefetch(begins[later as usize].pair as usize);
+            }
+            let begin = &begins[order[nth].1 as usize];
+            // SAFETY: a pair begins once, and each begin is filled once.
+            let (pair, told) = unsafe { (pairs.get_mut(begin.pair as usize), unbegun.get_mut(nth)) };
+            *told = (begin.key, arbiter.id);
+            (arbiter.pair, pair.arbiter) = (begin.pair, arbiter.id.index);
+            arbiter.data = fresh_data();
+            filler.fill(begin, pair, &mut arbiter.data);
+        };
+        self.arbiters.create_many(order.len(), self.bodies.len(), &mut self.pool, name_of, fill);
+    }
+}
+
+/// Gives contacts and materials to arbiters that begin.
+struct Filler<'a> {
+    shapes: &'a [ShapeSlot],
+    bodies: &'a [Body],
+    masses: &'a [BodyMass],
+    break_distance: Real,
+    /// Whether manifolds may be used again.
+    reusable: bool,
+}
+
+impl Filler<'_> {
+    fn fill(&self, begin: &Begin, pair: &mut Pair, data: &mut ContactData) {
+        let rotations = begin.bodies.map(|body| self.masses[body as usize].rotation);
+        update_contacts(data, &begin.places, rotations, self.break_distance);
+        pair.has_manifold = self.reusable;
+        mix_shape_materials(pair, data, self.shapes, self.bodies);
     }
 }
 
