@@ -23,6 +23,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 const DEEPEST_REST: Real = 1.97;
 /// Bodies that a thread takes at a time.
 const BODIES_PER_BLOCK: usize = 64;
+/// What a thread's list of what it has found has room for from the start.
+const NEWS_PER_THREAD: usize = 64;
 
 /// Rows whose contacts a thread looks at at a time.
 const ROWS_PER_BLOCK: usize = 512;
@@ -258,7 +260,7 @@ impl World {
             self.broad_phase.find_pairs(is_new, found);
             return;
         }
-        self.scratch.found.prepare(threads, BODIES_PER_BLOCK);
+        self.scratch.found.prepare(threads, NEWS_PER_THREAD);
         self.broad_phase.prepare(PARTS_PER_THREAD * threads);
         let (broad_phase, gather) = (&self.broad_phase, &self.scratch.found);
         let work = broad_phase.work();
@@ -361,8 +363,8 @@ impl World {
     fn finalize(&mut self, dt: Real, report: &mut StepReport) {
         let mut gather = std::mem::take(&mut self.scratch.news);
         let mut left = std::mem::take(&mut self.scratch.left);
-        gather.prepare(self.pool.threads(), BODIES_PER_BLOCK);
-        left.prepare(self.pool.threads(), BODIES_PER_BLOCK);
+        gather.prepare(self.pool.threads(), NEWS_PER_THREAD);
+        left.prepare(self.pool.threads(), NEWS_PER_THREAD);
         self.finalize_bodies(dt, &gather, &left);
         // Before the fast: a body that is stopped short moves its boxes back. In any order: the tree comes out the same.
         self.broad_phase.lift(left.list(), Some(&mut self.pool));
@@ -457,7 +459,7 @@ impl World {
 
     /// Drops contacts past the break distance; arbiters that have none left are appended to `empty`, in no particular order.
     fn break_contacts(&mut self, empty: &mut Vec<u32>) {
-        self.scratch.broken.prepare(self.pool.threads(), BODIES_PER_BLOCK);
+        self.scratch.broken.prepare(self.pool.threads(), NEWS_PER_THREAD);
         let (rows, may_break) = (&self.plan.rows, &self.scratch.may_break);
         let (broken, masses) = (&self.scratch.broken, &self.solver_bodies.masses);
         let break_distance = self.scaled.contact_break_distance;
