@@ -5,7 +5,7 @@ use super::bodies::world_inverse_inertia;
 use super::collide::shapes_overlap;
 use super::pairs::PairRules;
 use super::timings::{Phase, PhaseClock, Timings};
-use crate::arbiter::{EndReason, Entry, NONE};
+use crate::arbiter::{Arbiter, EndReason, Entry, NONE};
 use crate::broad_phase::Boxes;
 use crate::error::{Error, in_range};
 use crate::id::BodyId;
@@ -14,7 +14,7 @@ use crate::parallel::{BlockList, Gather, SharedSlice};
 use crate::simd::prefetch;
 use crate::solver::{
     BodyMass, BodyMotion, BodyState, IntegrateParameters, IntegrateTarget, Integration, Pass, PassParameters,
-    PrepareContext, Softness, StoreTarget,
+    PrepareContext, RowPart, Softness, StoreTarget,
 };
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -463,21 +463,33 @@ impl World {
         let (rows, may_break) = (&self.plan.rows, &self.scratch.may_break);
         let (broken, masses) = (&self.scratch.broken, &self.solver_bodies.masses);
         let break_distance = self.scaled.contact_break_distance;
+        let break_one = |arbiter: &mut Arbiter| {
+            let [pose1, pose2] = [arbiter.body1, arbiter.body2].map(|body| masses[body.index as usize].pose());
+            arbiter.data.break_contacts(&pose1, &pose2, break_distance);
+            arbiter.data.usage_mask & 15 == 0
+        };
         let arbiters = SharedSlice::new(self.arbiters.slots_mut());
         self.pool.run(rows.len().div_ceil(ROWS_PER_BLOCK), |block| {
             let mut found = broken.block();
             let range = block * ROWS_PER_BLOCK..((block + 1) * ROWS_PER_BLOCK).min(rows.len());
             for (row, _) in rows[range.clone()].iter().zip(&may_break[range]).filter(|(_, may_break)| **may_break) {
-                // SAFETY: an arbiter has one row.
-                let arbiter = unsafe { arbiters.get_mut(row.arbiter as usize) };
-                let [pose1, pose2] = [arbiter.body1, arbiter.body2].map(|body| masses[body.index as usize].pose());
-                arbiter.data.break_contacts(&pose1, &pose2, break_distance);
-                if arbiter.data.usage_mask & 15 == 0 {
+                // Where the arbiter has other rows, they may be another thread's at this moment: it has to wait.
+                let is_over = row.part != RowPart::Only || {
+                    // SAFETY: the arbiter has this row alone.
+                    break_one(unsafe { arbiters.get_mut(row.arbiter as usize) })
+                };
+                if is_over {
                     found.push(row.arbiter);
                 }
             }
         });
-        empty.append(self.scratch.broken.list());
+        // No other thread is at work here.
+        let (found, arbiters) = (self.scratch.broken.list(), self.arbiters.slots_mut());
+        found.retain(|&index| {
+            let arbiter = &mut arbiters[index as usize];
+            arbiter.data.usage_mask & 15 == 0 || break_one(arbiter)
+        });
+        empty.append(found);
     }
 
     /// Takes out of a list of arbiters without contacts those that go on: their shapes overlap, or they are gone already.
