@@ -127,7 +127,7 @@ fn collide_sorted(
         (Shape::Hull(a), Shape::Cuboid(b)) => hull::collide(level, (a, b), pose, margin, (cache, manifold)),
         (Shape::Hull(a), Shape::Hull(b)) => hull::collide(level, (a, &**b), pose, margin, (cache, manifold)),
         (Shape::Mesh(_), Shape::Mesh(_)) => manifold.clear(),
-        (Shape::Mesh(a), convex) => mesh::collide(a, convex, pose, margin, cache, manifold),
+        (Shape::Mesh(a), convex) => mesh::collide(a, convex, pose, margin, manifold),
         _ => manifold.clear(),
     }
 }
