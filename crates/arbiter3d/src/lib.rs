@@ -44,8 +44,8 @@ mod world;
 pub use arbiter::{Arbiter, ArbiterId, ArbiterKey, Contact, ContactData, ContactPoint, EndReason, SolveMode};
 pub use query::{Ray, ShapeHit, cast_ray};
 pub use shape::{
-    Capsule, ConvexHull, Cuboid, HalfEdge, MassProperties, MeshEdge, MeshRayHit, MeshSides, Plane, Shape, ShapeError,
-    Sphere, TriangleMesh,
+    Capsule, ConvexHull, Cuboid, HalfEdge, MassProperties, MeshRayHit, MeshSides, Plane, Shape, ShapeError, Sphere,
+    TriangleMesh,
 };
 pub use simd::{SimdLevel, UnknownSimdLevel};
 pub use world::{

@@ -7,6 +7,10 @@
 //! Lists that are filled and drained in every step have to hold the most that a step puts in, and the first step of a scene
 //! in which all contacts begin puts in a hundred times what later steps do. A [`Peak`] notes how full a list gets, and once
 //! in [`WINDOW`] steps gives back what none of them has needed. A steady world gives nothing back, and so allocates nothing.
+//!
+//! A [`FixedList`] is a short list on the stack, for what one pass leaves for the next.
+
+use std::mem::MaybeUninit;
 
 /// Steps over which the most is taken.
 const WINDOW: u32 = 32;
@@ -69,9 +73,60 @@ pub(crate) fn shrink<T>(list: &mut Vec<T>, count: usize) {
     }
 }
 
+/// A list with room for `N` entries, in place.
+///
+/// Left blank at first: to fill lists of which little is used would cost more than that use.
+pub(crate) struct FixedList<T, const N: usize> {
+    entries: [MaybeUninit<T>; N],
+    count: usize,
+}
+
+impl<T: Copy, const N: usize> FixedList<T, N> {
+    #[inline(always)]
+    pub fn new() -> Self {
+        Self { entries: [const { MaybeUninit::uninit() }; N], count: 0 }
+    }
+
+    /// Adds an entry.
+    ///
+    /// # Panics
+    /// If the list is full.
+    #[inline(always)]
+    pub fn push(&mut self, entry: T) {
+        self.entries[self.count] = MaybeUninit::new(entry);
+        self.count += 1;
+    }
+
+    #[inline(always)]
+    pub fn as_slice(&self) -> &[T] {
+        // SAFETY: `push` has written the first `count`, and `MaybeUninit<T>` lies in memory as `T` does.
+        unsafe { std::slice::from_raw_parts(self.entries.as_ptr().cast(), self.count) }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_fixed_list_holds_what_was_pushed_up_to_its_size() {
+        let mut list = FixedList::<(u8, u64), 5>::new();
+        assert!(list.as_slice().is_empty());
+        for i in 0..5 {
+            list.push((i, 1 << (10 * i)));
+            let expected = (0..=i).map(|k| (k, 1 << (10 * k)));
+            assert!(list.as_slice().iter().copied().eq(expected), "{:?}", list.as_slice());
+        }
+    }
+
+    #[test]
+    #[should_panic(expected = "out of bounds")]
+    fn a_full_fixed_list_takes_no_more() {
+        let mut list = FixedList::<u32, 2>::new();
+        for i in 0..3 {
+            list.push(i);
+        }
+    }
 
     #[test]
     fn a_long_list_never_has_more_than_an_eighth_to_spare_and_moves_rarely() {

@@ -9,7 +9,7 @@
 use super::SolveMode;
 use crate::error::{self, Error};
 use crate::math::{Real, Rotation, Vec3};
-use crate::simd::Quad;
+use crate::simd::quad_view;
 
 /// Slots of an arbiter.
 pub(crate) const SLOTS: usize = 4;
@@ -95,19 +95,13 @@ impl Contact {
         self.remove
     }
 
-    /// The first sixteen numbers in groups of four: anchors, normal, impulses and gap.
-    #[inline(always)]
-    pub(crate) fn quads(&self) -> &[Quad; 4] {
-        const { assert!(std::mem::offset_of!(Self, feature) == size_of::<[Quad; 4]>()) };
-        // SAFETY: `repr(C)`; the first sixteen words are floats.
-        unsafe { &*std::ptr::from_ref(self).cast() }
-    }
-
-    /// The same, to change.
-    #[inline(always)]
-    pub(crate) fn quads_mut(&mut self) -> &mut [Quad; 4] {
-        // SAFETY: as above.
-        unsafe { &mut *std::ptr::from_mut(self).cast() }
+    quad_view! {
+        /// The first sixteen numbers in groups of four: anchors, normal, impulses and gap.
+        pub(crate) fn quads,
+        /// The same, to change.
+        quads_mut;
+        [4] of (local_anchor1, local_anchor2, normal, normal_impulse, tangent_impulse, twist_impulse, separation,
+            total_impulse)
     }
 
     /// Takes over the impulses of the contact that this one replaces, the tangential one turned into the new plane.
@@ -170,12 +164,10 @@ pub(crate) const ROLLING_OVERRIDDEN: u8 = 8;
 pub(crate) const ONE_NORMAL: u8 = 16;
 
 impl ContactData {
-    /// The rotations of the levers as groups of four numbers.
-    #[inline(always)]
-    pub(crate) fn rotation_quads(&self) -> &[Quad; 2] {
-        const { assert!(size_of::<[Rotation; 2]>() == size_of::<[Quad; 2]>()) };
-        // SAFETY: `repr(C)`, four floats each.
-        unsafe { &*std::ptr::from_ref(&self.rotations).cast() }
+    quad_view! {
+        /// The rotations of the levers as groups of four numbers.
+        pub(crate) fn rotation_quads;
+        [2] of (rotations)
     }
 
     /// Bits 0 to 3: the slot holds a contact. Bits 4 to 7: the slot was solved in the last step.

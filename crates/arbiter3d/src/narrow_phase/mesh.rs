@@ -14,9 +14,9 @@ use super::mesh_points::{Candidate, Candidates, NO_FACET};
 use super::polyhedron::{CuboidFeatures, Polyhedron};
 use super::triangle::{Frame, Group, Reach, Solid};
 use super::triangle_lanes::Near;
-use super::triangle_solid::Solids;
-use super::{Manifold, ManifoldPoint, PairCache};
-use crate::math::{Aabb, Mat3, Pose, Real, Vec3, abs3};
+use super::triangle_solid::Faceted;
+use super::{Manifold, ManifoldPoint};
+use crate::math::{Aabb, Mat3, Pose, Real, Vec3, abs3, min};
 use crate::shape::{LEAF, Leaves, MeshSides, Shape, TriangleMesh};
 use crate::simd::{LaneVec3, Lanes};
 
@@ -25,14 +25,7 @@ use crate::simd::{LaneVec3, Lanes};
 const BEHIND: Real = 0.1;
 
 /// Contacts of a mesh (shape 1, whose frame the manifold is in) and a convex shape placed in that frame by `pose`.
-pub(crate) fn collide(
-    mesh: &TriangleMesh,
-    convex: &Shape,
-    pose: &Pose,
-    margin: Real,
-    _cache: &mut PairCache,
-    manifold: &mut Manifold,
-) {
+pub(crate) fn collide(mesh: &TriangleMesh, convex: &Shape, pose: &Pose, margin: Real, manifold: &mut Manifold) {
     manifold.clear();
     let aabb = convex.aabb(pose).expand(margin);
     let mut contact = Contact { mesh, pose, aabb, margin, manifold };
@@ -41,13 +34,14 @@ pub(crate) fn collide(
         Shape::Sphere(sphere) => contact.gather(&mut { *sphere }, Mat3::IDENTITY),
         Shape::Capsule(capsule) => contact.gather(&mut { *capsule }, pose.rotation.to_mat3()),
         Shape::Cuboid(cuboid) => {
-            contact.gather(&mut Solids::new(CuboidFeatures::new(cuboid).view()), pose.rotation.to_mat3());
+            contact.gather(&mut Faceted::new(CuboidFeatures::new(cuboid).view()), pose.rotation.to_mat3());
         }
-        Shape::Hull(hull) => contact.gather(&mut Solids::new(Polyhedron::from_hull(hull)), pose.rotation.to_mat3()),
+        Shape::Hull(hull) => contact.gather(&mut Faceted::new(Polyhedron::from_hull(hull)), pose.rotation.to_mat3()),
         Shape::Mesh(_) => {}
     }
 }
 
+/// A convex shape near a mesh.
 struct Contact<'a> {
     mesh: &'a TriangleMesh,
     pose: &'a Pose,
@@ -57,9 +51,10 @@ struct Contact<'a> {
 }
 
 impl Contact<'_> {
+    /// Finds the points and hands on the four that matter; `rotation` turns the solid's frame into the mesh's.
     fn gather(&mut self, solid: &mut impl Solid, rotation: Mat3) {
         let inner = solid.inner_radius();
-        let scale = if self.margin > 0.0 { crate::math::min(self.margin, inner) } else { 0.02 * inner };
+        let scale = if self.margin > 0.0 { min(self.margin, inner) } else { 0.02 * inner };
         let frame = Frame { rotation, inverse: rotation.transpose(), position: self.pose.position, scale };
         let mut reach = Reach { margin: self.margin, scale, second_look: false };
         solid.place(&frame);

@@ -6,9 +6,10 @@
 //!
 //! At the end the groups are merged, nearest normals first, until there are at most four. Every group gives its deepest
 //! point; the remaining places go where they add most, points that touch before those that do not: the square of a length
-//! for the second point of a group, twice the area for the third and the fourth. So a box on a floor keeps its four corners, a box in a groove two on each side.
+//! for the second point of a group, twice the area for the third and the fourth. So a box on a floor keeps its four corners,
+//! a box in a groove two on each side.
 
-use crate::math::{Real, Vec3, tangents};
+use crate::math::{Real, Vec3, max, min, tangents};
 
 /// The normal of a point is not that of a triangle.
 pub(super) const NO_FACET: u32 = u32::MAX;
@@ -26,6 +27,7 @@ pub(super) struct Candidate {
     pub(super) facet: u32,
 }
 
+/// Points that the buffer holds.
 const CAPACITY: usize = 64;
 /// Groups kept when the buffer is full: six of nine points leave room for ten more.
 const MOST_GROUPS: usize = 6;
@@ -132,8 +134,8 @@ impl Candidates {
     /// what stands off (a wall beside a box on a floor) bears nothing yet, and one point is enough to stop at it.
     fn touching(&self, chosen: &Chosen, groups: usize) -> (u8, Real) {
         let nearest = |group: usize| self.list[chosen.points[group][0]].separation;
-        let least = (0..groups).fold(Real::MAX, |m, group| crate::math::min(m, nearest(group)));
-        let limit = crate::math::max(least, 0.0) + STANDS_OFF * self.tolerance;
+        let least = (0..groups).fold(Real::MAX, |m, group| min(m, nearest(group)));
+        let limit = max(least, 0.0) + STANDS_OFF * self.tolerance;
         ((0..groups).filter(|&group| nearest(group) <= limit).fold(0, |mask, group| mask | 1 << group), limit)
     }
 
@@ -208,6 +210,7 @@ impl Candidates {
         groups
     }
 
+    /// The points of a group, with their places in the list.
     fn members<'a>(&'a self, groups: &'a Groups, group: usize) -> impl Iterator<Item = (usize, &'a Candidate)> {
         let all = self.list[..self.count].iter().enumerate();
         all.filter(move |(i, _)| groups.of[*i] as usize == group)
@@ -216,7 +219,7 @@ impl Candidates {
     /// The deepest point of a group. Of several that are equally deep, an outermost one: a corner of the contact patch
     /// rather than a point inside it, and the same one in every step.
     fn deepest_of(&self, groups: &Groups, group: usize) -> usize {
-        let least = self.members(groups, group).fold(Real::MAX, |m, (_, c)| crate::math::min(m, c.separation));
+        let least = self.members(groups, group).fold(Real::MAX, |m, (_, c)| min(m, c.separation));
         let (t1, t2) = tangents(groups.normals[group]);
         let outwards = t1 + t2 * 0.618;
         let mut best = (0, -Real::MAX);
@@ -296,7 +299,8 @@ impl Chosen {
     }
 }
 
-/// What a point adds to those of its group: square of the distance, twice the area of the triangle, twice the area outside it.
+/// What a point adds to those of its group: square of the distance, twice the area of the triangle, twice the area outside
+/// it.
 fn gain(corners: &[Vec3], point: Vec3, normal: Vec3) -> Real {
     match *corners {
         [a] => (point - a).length_squared(),
@@ -304,7 +308,7 @@ fn gain(corners: &[Vec3], point: Vec3, normal: Vec3) -> Real {
         [a, b, c] => {
             let turn = if normal.dot((b - a).cross(c - a)) < 0.0 { -1.0 } else { 1.0 };
             let outside = |p: Vec3, q: Vec3| -turn * normal.dot((q - p).cross(point - p));
-            crate::math::max(crate::math::max(outside(a, b), outside(b, c)), outside(c, a))
+            max(max(outside(a, b), outside(b, c)), outside(c, a))
         }
         _ => 0.0,
     }

@@ -124,10 +124,10 @@ fn collide_sorted(
         (Shape::Cuboid(a), Shape::Capsule(b)) => capsule::cuboid_capsule(a, b, pose, margin, manifold),
         (Shape::Hull(a), Shape::Sphere(b)) => sphere::hull_sphere(a, b, pose, margin, manifold),
         (Shape::Hull(a), Shape::Capsule(b)) => capsule::hull_capsule(a, b, pose, margin, manifold),
-        (Shape::Hull(a), Shape::Cuboid(b)) => hull::hull_cuboid(level, (a, b), pose, margin, (cache, manifold)),
-        (Shape::Hull(a), Shape::Hull(b)) => hull::hull_hull(level, (a, b), pose, margin, (cache, manifold)),
+        (Shape::Hull(a), Shape::Cuboid(b)) => hull::collide(level, (a, b), pose, margin, (cache, manifold)),
+        (Shape::Hull(a), Shape::Hull(b)) => hull::collide(level, (a, &**b), pose, margin, (cache, manifold)),
         (Shape::Mesh(_), Shape::Mesh(_)) => manifold.clear(),
-        (Shape::Mesh(a), convex) => mesh::collide(a, convex, pose, margin, cache, manifold),
+        (Shape::Mesh(a), convex) => mesh::collide(a, convex, pose, margin, manifold),
         _ => manifold.clear(),
     }
 }

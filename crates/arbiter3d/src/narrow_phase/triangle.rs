@@ -299,7 +299,19 @@ pub(super) trait Solid {
     }
 }
 
-impl Solid for Sphere {
+/// A ball, or a ball moved along a segment: held against one triangle after the other.
+trait Round {
+    /// Of the ball.
+    fn radius(&self) -> Real;
+    /// The box around the shape in its frame.
+    fn bounds(&self) -> Aabb;
+    /// Zero where the lowest point of the shape is too far above a triangle's plane.
+    fn keep_low<W: Lanes<LANES>>(&self, frame: &Frame, sides: W, planes: &Planes<W>) -> W;
+    /// Adds the points of one triangle; returns as [`Solid::touch_group`].
+    fn touch(&self, triangle: &Triangle, reach: &Reach, out: &mut Candidates) -> bool;
+}
+
+impl<R: Round> Solid for R {
     fn center(&self) -> Vec3 {
         Vec3::ZERO
     }
@@ -309,12 +321,12 @@ impl Solid for Sphere {
     }
 
     fn bounds(&self) -> Aabb {
-        self.local_aabb()
+        Round::bounds(self)
     }
 
     #[inline(always)]
     fn keep_reached<W: Lanes<LANES>>(&self, near: &Near, sides: W, planes: &Planes<W>) -> W {
-        near.keep_in_box(planes.keep_low(sides, &[Vec3::ZERO], self.radius()), planes)
+        near.keep_in_box(self.keep_low(near.frame, sides, planes), planes)
     }
 
     fn touch_group(
@@ -325,11 +337,32 @@ impl Solid for Sphere {
         reach: &Reach,
         out: &mut Candidates,
     ) -> bool {
-        group.drain(mesh, frame, |triangle| touch_sphere(self, triangle, reach, out))
+        group.drain(mesh, frame, |triangle| self.touch(triangle, reach, out))
+    }
+}
+
+impl Round for Sphere {
+    fn radius(&self) -> Real {
+        Self::radius(self)
+    }
+
+    fn bounds(&self) -> Aabb {
+        self.local_aabb()
+    }
+
+    #[inline(always)]
+    fn keep_low<W: Lanes<LANES>>(&self, _frame: &Frame, sides: W, planes: &Planes<W>) -> W {
+        planes.keep_low(sides, &[Vec3::ZERO], self.radius())
+    }
+
+    #[inline(always)]
+    fn touch(&self, triangle: &Triangle, reach: &Reach, out: &mut Candidates) -> bool {
+        touch_sphere(self, triangle, reach, out)
     }
 }
 
 /// The face if the centre is above it, else the nearest edge or corner if that is a summit.
+#[inline]
 fn touch_sphere(sphere: &Sphere, triangle: &Triangle, reach: &Reach, out: &mut Candidates) -> bool {
     let height = triangle.height(Vec3::ZERO);
     if height - sphere.radius() > reach.margin {
@@ -372,6 +405,7 @@ fn touch_sphere(sphere: &Sphere, triangle: &Triangle, reach: &Reach, out: &mut C
 }
 
 /// Whether the point at `t` of edge `i` may push along `normal`.
+#[inline]
 fn rim_allows(triangle: &Triangle, i: usize, t: Real, normal: Vec3) -> bool {
     if t <= 0.0 {
         triangle.corner_allows(i, normal)
@@ -382,13 +416,9 @@ fn rim_allows(triangle: &Triangle, i: usize, t: Real, normal: Vec3) -> bool {
     }
 }
 
-impl Solid for Capsule {
-    fn center(&self) -> Vec3 {
-        Vec3::ZERO
-    }
-
-    fn inner_radius(&self) -> Real {
-        self.radius()
+impl Round for Capsule {
+    fn radius(&self) -> Real {
+        Self::radius(self)
     }
 
     fn bounds(&self) -> Aabb {
@@ -396,24 +426,19 @@ impl Solid for Capsule {
     }
 
     #[inline(always)]
-    fn keep_reached<W: Lanes<LANES>>(&self, near: &Near, sides: W, planes: &Planes<W>) -> W {
-        let end = near.frame.rotation.y_axis * self.half_length();
-        near.keep_in_box(planes.keep_low(sides, &[-end, end], self.radius()), planes)
+    fn keep_low<W: Lanes<LANES>>(&self, frame: &Frame, sides: W, planes: &Planes<W>) -> W {
+        let end = frame.rotation.y_axis * self.half_length();
+        planes.keep_low(sides, &[-end, end], self.radius())
     }
 
-    fn touch_group(
-        &mut self,
-        mesh: &TriangleMesh,
-        frame: &Frame,
-        group: &mut Group,
-        reach: &Reach,
-        out: &mut Candidates,
-    ) -> bool {
-        group.drain(mesh, frame, |triangle| touch_capsule(self, triangle, reach, out))
+    #[inline(always)]
+    fn touch(&self, triangle: &Triangle, reach: &Reach, out: &mut Candidates) -> bool {
+        touch_capsule(self, triangle, reach, out)
     }
 }
 
 /// The ends of the part of the segment above the face, and the nearest points of the edges that are summits there.
+#[inline]
 fn touch_capsule(capsule: &Capsule, triangle: &Triangle, reach: &Reach, out: &mut Candidates) -> bool {
     let end = Vec3::new(0.0, capsule.half_length(), 0.0);
     let (low, high) = (triangle.height(-end), triangle.height(end));
@@ -467,6 +492,7 @@ impl Capsule {
     }
 
     /// The point or two nearest to edge `i`; whether there are any.
+    #[inline]
     fn touch_edge(&self, triangle: &Triangle, i: usize, reach: &Reach, out: &mut Candidates) -> bool {
         let (a, b) = triangle.edge(i);
         let end = Vec3::new(0.0, self.half_length(), 0.0);
@@ -505,6 +531,7 @@ pub(super) struct SegmentPair {
 
 impl SegmentPair {
     /// Source: Ericson, "Real-Time Collision Detection", 2005, section 5.1.9.
+    #[inline]
     pub(super) fn nearest(first: (Vec3, Vec3), second: (Vec3, Vec3)) -> Self {
         let (d1, d2, r) = (first.1 - first.0, second.1 - second.0, first.0 - second.0);
         let (a, e, b) = (d1.length_squared(), d2.length_squared(), d1.dot(d2));
@@ -529,10 +556,9 @@ pub(super) fn parallel_part(first: (Vec3, Vec3), second: (Vec3, Vec3)) -> Option
     if d1.cross(d2).length_squared() > 0.0025 * a * d2.length_squared() {
         return None;
     }
-    let mut ts = [0.0, 1.0];
     let (t0, t1) = (d1.dot(second.0 - first.0) / a, d1.dot(second.1 - first.0) / a);
     let (low, high) = if t0 < t1 { (t0, t1) } else { (t1, t0) };
-    ts = [max(ts[0], low), min(ts[1], high)];
+    let ts = [max(0.0, low), min(1.0, high)];
     if ts[1] - ts[0] <= 1e-3 {
         return None;
     }

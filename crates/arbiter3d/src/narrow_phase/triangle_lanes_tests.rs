@@ -96,7 +96,7 @@ fn sifting_keeps_what_overlaps_both_boxes_on_the_right_side() {
         let bounds = Aabb::from_center(Vec3::ZERO, Vec3::new(0.5, 0.2, 0.3));
         let one_sided = round % 2 == 0;
         let cuboid = CuboidFeatures::new(&Cuboid::new(Vec3::new(0.49, 0.19, 0.29)).unwrap());
-        let mut solid = Solids::new(cuboid.view());
+        let mut solid = Faceted::new(cuboid.view());
         solid.place(&frame);
         let reach = Reach { margin: 0.01, scale: 0.01, second_look: false };
         let near =

@@ -42,7 +42,7 @@ const EXTRA_DEPTH: Real = 0.25;
 const BIAS: Real = 0.02;
 
 /// A cuboid or a hull with the box around it.
-pub(super) struct Solids<'a> {
+pub(super) struct Faceted<'a> {
     features: Polyhedron<'a>,
     bounds: Aabb,
     /// Between what planes it lies, in the axes of the mesh: all of its faces or the first of them.
@@ -106,7 +106,7 @@ enum Axis {
     Edges { edge: usize, solid_edge: usize, normal: Vec3 },
 }
 
-impl<'a> Solids<'a> {
+impl<'a> Faceted<'a> {
     pub(super) fn new(features: Polyhedron<'a>) -> Self {
         let mut bounds = Aabb::EMPTY;
         for &vertex in features.vertices {
@@ -134,7 +134,7 @@ impl<'a> Solids<'a> {
     }
 }
 
-impl Solid for Solids<'_> {
+impl Solid for Faceted<'_> {
     fn center(&self) -> Vec3 {
         self.features.center
     }

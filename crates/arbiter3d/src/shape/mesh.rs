@@ -15,8 +15,6 @@ use crate::math::{Aabb, Real, Vec3, max3, min3};
 use crate::simd::{LaneVec3, Lanes, Quad};
 use glam::DVec3;
 
-pub use super::mesh_edges::MeshEdge;
-
 /// Which side of its triangles a mesh is solid on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum MeshSides {

@@ -6,8 +6,8 @@
 //! leaves it. Flat and concave edges allow no normal of their own, so that seams inside a surface are never felt.
 //!
 //! Corners are joined by position, so triangles that share no indices are neighbours all the same, and an open edge that
-//! runs along another triangle (a T-junction) is a seam with that one. Where more than two
-//! triangles meet at an edge, the neighbour that closes most of the front side counts.
+//! runs along another triangle (a T-junction) is a seam with that one. Where more than two triangles meet at an edge, the
+//! neighbour that closes most of the front side counts.
 //!
 //! Of all this a mesh keeps six bytes a triangle: by which angle the surface bends at each edge ([`Bend`]), from which the
 //! direction into the neighbour follows. Neighbours themselves are not kept: where a corner's edges are asked for, the
@@ -16,10 +16,9 @@
 use crate::math::{Real, Vec3};
 
 /// How a triangle goes on across an edge.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum MeshEdge {
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum EdgeKind {
     /// It does not: no other triangle has this edge.
-    #[default]
     Boundary,
     /// The neighbour bends away from the front side: a ridge.
     Convex,
@@ -52,8 +51,8 @@ impl Bend {
 
     /// The bend from a triangle (unit normal, unit vector inwards from the edge) to a neighbour (unit vector away from the
     /// edge).
-    fn new(kind: MeshEdge, normal: Vec3, own: Vec3, neighbor: Vec3) -> Self {
-        if kind == MeshEdge::Boundary {
+    fn new(kind: EdgeKind, normal: Vec3, own: Vec3, neighbor: Vec3) -> Self {
+        if kind == EdgeKind::Boundary {
             return Self::BOUNDARY;
         }
         let (sine, cosine) = (neighbor.dot(normal), -neighbor.dot(own));
@@ -63,19 +62,19 @@ impl Bend {
         let most = 2 * Self::QUARTER as i16;
         // Rounding must not change the kind.
         Self(match kind {
-            MeshEdge::Concave => steps.clamp(Self::FLAT + 1, most),
-            MeshEdge::Convex if steps >= -Self::FLAT && cosine < 0.0 => -most,
-            MeshEdge::Convex => steps.clamp(-most, -Self::FLAT - 1),
+            EdgeKind::Concave => steps.clamp(Self::FLAT + 1, most),
+            EdgeKind::Convex if steps >= -Self::FLAT && cosine < 0.0 => -most,
+            EdgeKind::Convex => steps.clamp(-most, -Self::FLAT - 1),
             _ => steps.clamp(-Self::FLAT, Self::FLAT),
         })
     }
 
-    pub(crate) fn kind(self) -> MeshEdge {
+    pub(super) fn kind(self) -> EdgeKind {
         match self.0 {
-            i16::MIN => MeshEdge::Boundary,
-            steps if steps > Self::FLAT => MeshEdge::Concave,
-            steps if steps < -Self::FLAT => MeshEdge::Convex,
-            _ => MeshEdge::Flat,
+            i16::MIN => EdgeKind::Boundary,
+            steps if steps > Self::FLAT => EdgeKind::Concave,
+            steps if steps < -Self::FLAT => EdgeKind::Convex,
+            _ => EdgeKind::Flat,
         }
     }
 
@@ -258,14 +257,14 @@ impl<'a> Adjacency<'a> {
         }
         let Some((closing, other, inward)) = closest else { return };
         let kind = if closing > FLAT_SINE {
-            MeshEdge::Concave
+            EdgeKind::Concave
         } else if closing < -FLAT_SINE {
-            MeshEdge::Convex
+            EdgeKind::Convex
         } else {
-            MeshEdge::Flat
+            EdgeKind::Flat
         };
         self.bends[side.triangle as usize][side.edge as usize] = Bend::new(kind, normal, own, inward);
-        if kind == MeshEdge::Flat {
+        if kind == EdgeKind::Flat {
             self.join_patches(side.triangle, other);
         }
     }
@@ -312,9 +311,9 @@ impl<'a> Adjacency<'a> {
         for triangle in 0..self.bends.len() as u32 {
             for edge in 0..3 {
                 let mark = match self.bends[triangle as usize][edge].kind() {
-                    MeshEdge::Flat => continue,
-                    MeshEdge::Concave => BENT,
-                    MeshEdge::Boundary | MeshEdge::Convex => BENT | SHARP,
+                    EdgeKind::Flat => continue,
+                    EdgeKind::Concave => BENT,
+                    EdgeKind::Boundary | EdgeKind::Convex => BENT | SHARP,
                 };
                 for i in [edge, edge + 1] {
                     let corner = self.welded_corner(triangle, i);
@@ -330,9 +329,9 @@ impl<'a> Adjacency<'a> {
         let mut bits = 0;
         for (i, bend) in bends.iter().enumerate() {
             let corner = self.corners[self.welded_corner(id, i) as usize];
-            let sharp = matches!(bend.kind(), MeshEdge::Boundary | MeshEdge::Convex);
+            let sharp = matches!(bend.kind(), EdgeKind::Boundary | EdgeKind::Convex);
             bits |= u16::from(sharp) << i;
-            bits |= u16::from(bend.kind() == MeshEdge::Flat) << (3 + i);
+            bits |= u16::from(bend.kind() == EdgeKind::Flat) << (3 + i);
             bits |= u16::from(corner & SHARP != 0) << (6 + i);
             bits |= u16::from(corner & BENT == 0) << (9 + i);
         }

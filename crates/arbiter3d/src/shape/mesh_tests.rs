@@ -1,5 +1,6 @@
 //! The tree and the rays against brute force, the neighbourhood of known edges, and what is refused.
 
+use super::super::mesh_edges::EdgeKind;
 use super::*;
 
 /// Numbers from a linear congruential generator, in `[-1, 1)`.
@@ -131,24 +132,24 @@ fn bad_input_is_named() {
     assert!(TriangleMesh::new(tiny, vec![[0, 1, 2]]).is_ok(), "only the shape counts, not the size");
 }
 
-fn kinds(mesh: &TriangleMesh, index: usize) -> [MeshEdge; 3] {
+fn kinds(mesh: &TriangleMesh, index: usize) -> [EdgeKind; 3] {
     [0, 1, 2].map(|edge| mesh.surroundings(index).bend(edge).kind())
 }
 
 /// Two triangles hinged about the z axis: the second one's outer corner is up, level or down. Unshared indices on purpose.
 #[test]
 fn edges_know_whether_they_bend() {
-    for (height, kind) in [(0.0, MeshEdge::Flat), (0.5, MeshEdge::Concave), (-0.5, MeshEdge::Convex)] {
+    for (height, kind) in [(0.0, EdgeKind::Flat), (0.5, EdgeKind::Concave), (-0.5, EdgeKind::Convex)] {
         let vertices = vec![Vec3::ZERO, Vec3::Z, Vec3::X, Vec3::ZERO, Vec3::new(-1.0, height, 0.0), Vec3::Z];
         let mesh = TriangleMesh::new(vertices, vec![[0, 1, 2], [3, 4, 5]]).unwrap();
         let i = (0..2).find(|&i| mesh.surroundings(i).id == 0).unwrap();
         let around = mesh.surroundings(i);
-        assert_eq!(kinds(&mesh, i), [kind, MeshEdge::Boundary, MeshEdge::Boundary]);
+        assert_eq!(kinds(&mesh, i), [kind, EdgeKind::Boundary, EdgeKind::Boundary]);
         let expected = Vec3::new(-1.0, height, 0.0).normalize();
         assert!((around.bend(0).across(Vec3::Y, Vec3::X) - expected).length() < 1e-4);
-        assert_eq!(around.edge_is_sharp(0), kind == MeshEdge::Convex);
-        assert_eq!(around.edge_is_flat(0), kind == MeshEdge::Flat);
-        assert_eq!(around.patch == mesh.surroundings(1 - i).patch, kind == MeshEdge::Flat);
+        assert_eq!(around.edge_is_sharp(0), kind == EdgeKind::Convex);
+        assert_eq!(around.edge_is_flat(0), kind == EdgeKind::Flat);
+        assert_eq!(around.patch == mesh.surroundings(1 - i).patch, kind == EdgeKind::Flat);
         let mut ends = Vec::new();
         mesh.each_end(Vec3::ZERO, |end| {
             ends.push(end);
@@ -171,7 +172,7 @@ fn three_triangles_at_an_edge_close_the_front() {
         let on_seam = |e: usize| corners[e % 3].x == 0.0 && corners[e % 3].y == 0.0;
         let edge = (0..3).find(|&e| on_seam(e) && on_seam(e + 1)).unwrap();
         if mesh.surroundings(i).id < 2 {
-            assert_eq!(kinds(&mesh, i)[edge], MeshEdge::Concave);
+            assert_eq!(kinds(&mesh, i)[edge], EdgeKind::Concave);
         }
     }
 }
@@ -186,7 +187,7 @@ fn seams_without_shared_corners_are_closed() {
         let corners = mesh.corners(i);
         for edge in 0..3 {
             let seam = corners[edge].x == 0.0 && corners[(edge + 1) % 3].x == 0.0;
-            let expected = if seam { MeshEdge::Flat } else { MeshEdge::Boundary };
+            let expected = if seam { EdgeKind::Flat } else { EdgeKind::Boundary };
             assert_eq!(kinds(&mesh, i)[edge], expected, "triangle {} edge {edge}", mesh.surroundings(i).id);
         }
     }
@@ -203,8 +204,8 @@ fn bends_keep_the_direction_into_the_neighbour() {
         let around = (0..2).map(|i| mesh.surroundings(i)).find(|around| around.id == 0).unwrap();
         let across = around.bend(0).across(Vec3::Y, Vec3::X);
         assert!((across - expected).length() < 1e-4, "{angle} {across}");
-        assert_eq!(around.bend(0).kind() == MeshEdge::Convex, step < 0, "{angle}");
-        assert_eq!(around.bend(0).kind() == MeshEdge::Concave, step > 0, "{angle}");
+        assert_eq!(around.bend(0).kind() == EdgeKind::Convex, step < 0, "{angle}");
+        assert_eq!(around.bend(0).kind() == EdgeKind::Concave, step > 0, "{angle}");
     }
 }
 

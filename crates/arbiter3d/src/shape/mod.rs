@@ -22,7 +22,7 @@ pub use hull::{ConvexHull, HalfEdge, Plane};
 pub(crate) use hull_features::{BorderEdge, CornerGroup, FaceGroup, LANES};
 pub use mass::MassProperties;
 pub(crate) use mesh::Facet;
-pub use mesh::{MeshEdge, MeshRayHit, MeshSides, TriangleMesh};
+pub use mesh::{MeshRayHit, MeshSides, TriangleMesh};
 pub(crate) use mesh_edges::Surroundings;
 pub(crate) use mesh_tree::{LEAF, Leaves};
 pub use sphere::Sphere;

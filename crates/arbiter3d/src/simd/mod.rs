@@ -6,12 +6,14 @@
 //! [`Instructions::run`] enters a kernel under the instructions of a level. Fused multiply-add is never enabled.
 
 mod pose;
+mod quads;
 mod vector;
 mod wide;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
 pub(crate) use pose::LanePose;
+pub(crate) use quads::{quad_view, size_of_words};
 pub(crate) use vector::{LaneRotation, LaneSymmetric, LaneVec3};
 pub(crate) use wide::{Lanes, Number, Quad, Wide};
 #[cfg(target_arch = "x86_64")]

@@ -273,3 +273,58 @@ impl<W> LaneSymmetric<W> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{Rotation, SymmetricMat3};
+
+    /// Spins, products and sums in lanes are those of one body, bit for bit; what a matrix solves, it multiplies back.
+    #[test]
+    fn lanes_are_rotations_and_matrices_side_by_side() {
+        let (mut spins, mut turns) = (LaneVec3::<Wide<8>>::ZERO, LaneVec3::<Wide<8>>::ZERO);
+        let (mut real, mut matrices) = (Wide([0.0; 8]), LaneSymmetric::<Wide<8>>::ZERO);
+        let of_lane = |lane: usize| {
+            let s = 0.2 + 0.31 * lane as f32;
+            let q = Rotation::from_xyzw(s, 0.4, -0.2 * s, 1.0).normalize();
+            let m = SymmetricMat3 { xx: 1.0 + s, yy: 3.0, zz: 2.0 + s * s, xy: 0.1 * s, xz: -0.3, yz: 0.2 * s };
+            (Vec3::new(0.02 * s, -0.3, 0.1 + s), q, m)
+        };
+        for lane in 0..8 {
+            let (spin, q, m) = of_lane(lane);
+            spins.set(lane, spin);
+            turns.set(lane, Vec3::new(q.x, q.y, q.z));
+            real[lane] = q.w;
+            for (part, x) in [
+                (&mut matrices.xx, m.xx),
+                (&mut matrices.yy, m.yy),
+                (&mut matrices.zz, m.zz),
+                (&mut matrices.xy, m.xy),
+                (&mut matrices.xz, m.xz),
+                (&mut matrices.yz, m.yz),
+            ] {
+                part[lane] = x;
+            }
+        }
+        let turned = LaneRotation { vector: turns, w: real }.integrate(&spins);
+        let (product, doubled) = (matrices.mul(&spins), matrices.add(&matrices).mul(&spins));
+        let solved = matrices.solve(&product);
+        for lane in 0..8 {
+            let (spin, q, m) = of_lane(lane);
+            let v = turned.vector.get(lane);
+            assert_eq!(Rotation::from_xyzw(v.x, v.y, v.z, turned.w[lane]), q.integrate(spin));
+            assert_eq!((product.get(lane), doubled.get(lane)), (m.mul(spin), m.add(&m).mul(spin)));
+            assert!((solved.get(lane) - spin).length() < 1e-5, "{} for {spin}", solved.get(lane));
+        }
+    }
+
+    /// A rotation that is no number becomes the identity, as [`Rotation::normalize`] has it; a singular matrix solves to zero.
+    #[test]
+    fn what_has_no_answer_is_harmless() {
+        let none = LaneRotation { vector: LaneVec3::<Wide<1>>::splat(Vec3::splat(f32::NAN)), w: Wide([0.0]) };
+        let turned = none.integrate(&LaneVec3::splat(Vec3::X));
+        assert_eq!((turned.vector.get(0), turned.w[0]), (Vec3::ZERO, 1.0));
+        let flat = LaneSymmetric::<Wide<1>> { xx: Wide([1.0]), ..LaneSymmetric::ZERO };
+        assert_eq!(flat.solve(&LaneVec3::splat(Vec3::ONE)).get(0), Vec3::ZERO);
+    }
+}

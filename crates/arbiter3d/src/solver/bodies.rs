@@ -6,7 +6,7 @@
 
 use crate::math::{Pose, Real, Rotation, SymmetricMat3, Vec3};
 use crate::parallel::SharedSlice;
-use crate::simd::{LaneVec3, Lanes, Quad};
+use crate::simd::{LaneVec3, Lanes, quad_view};
 use crate::storage;
 
 /// Marks a body index in a row whose body is not to be written.
@@ -59,19 +59,12 @@ impl BodyState {
         self.moves == 0 && self.linear_velocity == Vec3::ZERO && self.angular_velocity == Vec3::ZERO
     }
 
-    /// The record as groups of four numbers, the first three of which are its twelve.
-    #[inline(always)]
-    pub fn quads(&self) -> &[Quad; 4] {
-        const { assert!(size_of::<Self>() == size_of::<[Quad; 4]>()) };
-        // SAFETY: `repr(C)`, of equal size, and any bits are a float.
-        unsafe { &*std::ptr::from_ref(self).cast() }
-    }
-
-    /// The same, to change; the fourth group is to be left alone.
-    #[inline(always)]
-    pub fn quads_mut(&mut self) -> &mut [Quad; 4] {
-        // SAFETY: as above, and any bits are an integer.
-        unsafe { &mut *std::ptr::from_mut(self).cast() }
+    quad_view! {
+        /// The record as groups of four numbers, the first three of which are its twelve.
+        pub fn quads,
+        /// The same, to change; the fourth group is to be left alone.
+        quads_mut;
+        [4] of (linear_velocity, angular_velocity, translation, turn, constrained, moves, locked, unused)
     }
 }
 
@@ -105,19 +98,12 @@ impl Default for BodyMass {
 }
 
 impl BodyMass {
-    /// The record as groups of four numbers.
-    #[inline(always)]
-    pub fn quads(&self) -> &[Quad; 4] {
-        const { assert!(size_of::<Self>() == size_of::<[Quad; 4]>()) };
-        // SAFETY: `repr(C)`, sixteen floats.
-        unsafe { &*std::ptr::from_ref(self).cast() }
-    }
-
-    /// The same, to change.
-    #[inline(always)]
-    pub fn quads_mut(&mut self) -> &mut [Quad; 4] {
-        // SAFETY: as above.
-        unsafe { &mut *std::ptr::from_mut(self).cast() }
+    quad_view! {
+        /// The record as groups of four numbers.
+        pub fn quads,
+        /// The same, to change.
+        quads_mut;
+        [4] of (center, rotation, inverse_mass, inverse_inertia)
     }
 
     /// Pose of the frame at the centre of mass.
@@ -175,19 +161,13 @@ impl BodyMotion {
         inverse_inertia: SymmetricMat3::ZERO,
     };
 
-    /// The record as groups of four numbers.
-    #[inline(always)]
-    pub fn quads(&self) -> &[Quad; 8] {
-        const { assert!(size_of::<Self>() == size_of::<[Quad; 8]>()) };
-        // SAFETY: `repr(C)`, 32 floats.
-        unsafe { &*std::ptr::from_ref(self).cast() }
-    }
-
-    /// The same, to change.
-    #[inline(always)]
-    pub fn quads_mut(&mut self) -> &mut [Quad; 8] {
-        // SAFETY: as above.
-        unsafe { &mut *std::ptr::from_mut(self).cast() }
+    quad_view! {
+        /// The record as groups of four numbers.
+        pub fn quads,
+        /// The same, to change.
+        quads_mut;
+        [8] of (free_linear, linear_damping, free_angular, angular_damping, acceleration, kinematic,
+            angular_acceleration, gyroscopic, residual, broken, inertia, inverse_inertia)
     }
 }
 

@@ -34,14 +34,21 @@ const PREFETCH_AHEAD: usize = 8;
 /// Arbiters that a thread looks at at a time at least.
 const LEAST_ARBITERS: usize = 128;
 
+/// Which of its arbiter's rows a row is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum RowPart {
+    Only,
+    First,
+    Later,
+}
+
 /// Contacts of one arbiter that share a normal: what becomes one lane of a row.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RowSource {
     pub arbiter: u32,
     /// Which slots, as bits.
     pub slots: u8,
-    /// Whether rolling resistance acts here: once an arbiter.
-    pub first: bool,
+    pub part: RowPart,
     /// Whether the arbiter asks for what few rows need, or a body of it has a locked axis: see
     /// [`super::rows::ExtraRow`].
     pub extra: bool,
@@ -50,7 +57,13 @@ pub(crate) struct RowSource {
 
 impl RowSource {
     /// No row: an empty lane.
-    pub const NONE: Self = Self { arbiter: u32::MAX, slots: 0, first: false, extra: false, color: 0 };
+    pub const NONE: Self = Self { arbiter: u32::MAX, slots: 0, part: RowPart::Later, extra: false, color: 0 };
+
+    /// Whether rolling resistance acts here: once an arbiter.
+    #[inline(always)]
+    pub fn is_first(self) -> bool {
+        self.part != RowPart::Later
+    }
 
     /// By colour, then by its number of points: one, two, up to four.
     #[inline(always)]
@@ -232,7 +245,11 @@ impl RowPlan {
                 let source = RowSource {
                     arbiter: record.arbiter,
                     slots: rows as u8 & 15,
-                    first: rows == record.rows,
+                    part: match (rows == record.rows, rows >> 4) {
+                        (true, 0) => RowPart::Only,
+                        (true, _) => RowPart::First,
+                        (false, _) => RowPart::Later,
+                    },
                     extra: record.extra,
                     color,
                 };
@@ -332,6 +349,92 @@ fn static_color(rows: &mut u8) -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Colours rows of arbiters between these bodies, of which those from `first_fixed` on do not move; each arbiter has the
+    /// rows that `rows` packs.
+    fn plan_of(ties: &[[u32; 2]], first_fixed: u32, rows: u16) -> RowPlan {
+        let mut plan = RowPlan::default();
+        let bodies = ties.iter().flatten().max().map_or(0, |&last| last as usize + 1);
+        plan.used.resize(bodies, 0);
+        plan.fixed_rows.resize(bodies, 0);
+        plan.records = (0..)
+            .zip(ties)
+            .map(|(arbiter, &bodies)| Record {
+                bodies,
+                arbiter,
+                rows,
+                moves: bodies.map(|body| body < first_fixed),
+                first: (arbiter % 2) as u8,
+                ..Record::NONE
+            })
+            .collect();
+        let counts = plan.color();
+        plan.sort(counts);
+        plan
+    }
+
+    /// Asserts the laws of a plan; returns how many rows are in the overflow.
+    fn check(plan: &RowPlan, ties: &[[u32; 2]], first_fixed: u32) -> usize {
+        let (mut next, mut overflow) = (0, 0);
+        let mut slots = vec![0_u8; ties.len()];
+        for group in &plan.groups {
+            let mut taken = vec![false; plan.used.len()];
+            for (class, &(start, end)) in group.ranges.iter().enumerate() {
+                assert_eq!(start, next, "groups and classes follow one another");
+                next = end;
+                let rows = &plan.rows[start as usize..end as usize];
+                assert!(rows.is_sorted_by_key(|row| row.arbiter), "equal ones keep their order");
+                for row in rows {
+                    assert_eq!((row.slots.count_ones() as usize - 1).min(CLASSES - 1), class);
+                    assert_eq!(slots[row.arbiter as usize] & row.slots, 0);
+                    slots[row.arbiter as usize] |= row.slots;
+                    let moving = ties[row.arbiter as usize].into_iter().filter(|&body| body < first_fixed);
+                    assert!(!group.fixed || moving.clone().count() == 1);
+                    for body in moving {
+                        assert!(plan.constrains(body as usize));
+                        let shared = std::mem::replace(&mut taken[body as usize], true);
+                        assert!(!shared || group.serial, "two rows of a colour act on body {body}");
+                    }
+                }
+                overflow += if group.serial { rows.len() } else { 0 };
+            }
+        }
+        assert_eq!(next as usize, plan.rows.len());
+        let all = plan.records.first().map_or(0, |record| record.rows & 15 | record.rows >> 4);
+        assert!(slots.iter().all(|&slots| u16::from(slots) == all), "each row stands in the plan once");
+        overflow
+    }
+
+    /// 3,000 arbiters of two rows between 400 bodies, a fifth of which do not move: no colour has two rows of a body.
+    #[test]
+    fn rows_of_a_color_share_no_body_that_moves() {
+        let mut state = 7_u64;
+        let mut below = |end: u32| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 33) as u32 % end
+        };
+        let ties: Vec<[u32; 2]> = (0..3000)
+            .map(|_| {
+                let a = below(320);
+                [a, (a + 1 + below(399)) % 400]
+            })
+            .collect();
+        let plan = plan_of(&ties, 320, 0b1010_0001);
+        assert_eq!(plan.rows.len(), 6000);
+        check(&plan, &ties, 320);
+        assert!(plan.rows.iter().all(|row| row.part == if row.slots == 1 { RowPart::First } else { RowPart::Later }));
+    }
+
+    /// A hub with 100 neighbours that move has 36 too many, one with 70 that do not has 6.
+    #[test]
+    fn rows_without_a_color_go_to_the_overflow() {
+        let star = |neighbors: u32| (1..=neighbors).map(|other| [0, other]).collect::<Vec<_>>();
+        let (moving, fixed) = (star(100), star(70));
+        let plan = plan_of(&moving, 101, 0b1111);
+        assert_eq!(check(&plan, &moving, 101), 100 - DYNAMIC_COLORS);
+        assert!(plan.rows.iter().all(|row| row.part == RowPart::Only && row.is_first()));
+        assert_eq!(check(&plan_of(&fixed, 1, 0b1111), &fixed, 1), 70 - STATIC_COLORS);
+    }
 
     #[test]
     fn the_first_choice_swaps_the_colors_of_each_two() {

@@ -10,7 +10,7 @@ mod rows;
 mod solve;
 
 pub(crate) use bodies::{BodyMass, BodyMotion, BodyState, SolverBodies};
-pub(crate) use coloring::RowPlan;
+pub(crate) use coloring::{RowPart, RowPlan};
 pub(crate) use integrate::{IntegrateParameters, IntegrateTarget, Integration};
 pub(crate) use lanes::{ContactSolver, Pass, StoreTarget, contact_solver};
 pub(crate) use prepare::PrepareContext;

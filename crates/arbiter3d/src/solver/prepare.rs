@@ -106,7 +106,7 @@ fn features_of(sources: &[RowSource], context: &PrepareContext<'_>) -> RowFeatur
     for source in sources {
         let data = &context.arbiters[source.arbiter as usize].data;
         features.restitution |= data.restitution > 0.0;
-        features.rolling |= source.first && data.rolling_resistance > 0.0;
+        features.rolling |= source.is_first() && data.rolling_resistance > 0.0;
         features.conveyor |= data.tangent_velocity != Vec3::ZERO;
     }
     features
@@ -416,7 +416,7 @@ fn prepare_extra<W: Lanes<L>, const L: usize, const P: usize, const C: usize>(
         extra.restitution.set(lane, data.restitution);
         extra.target1.set(lane, data.tangent_velocity.dot(t1.get(lane)));
         extra.target2.set(lane, data.tangent_velocity.dot(t2.get(lane)));
-        if source.first && data.rolling_resistance > 0.0 {
+        if source.is_first() && data.rolling_resistance > 0.0 {
             extra.rolling_resistance.set(lane, data.rolling_resistance);
             extra.rolling_impulse.set(lane, data.rolling_impulse);
         }
@@ -537,7 +537,7 @@ pub(crate) fn store_lane<W: Lanes<L>, const L: usize, const P: usize, const C: u
         (quads[2], quads[3]) = (outcome.thirds[point][lane], outcome.fourths[point][lane]);
         slots &= slots - 1;
     }
-    if let (true, Some(extra)) = (source.first && solved.features.rolling, solved.extra) {
+    if let (true, Some(extra)) = (source.is_first() && solved.features.rolling, solved.extra) {
         arbiter.data.rolling_impulse = extra.rolling_impulse.get(lane);
     }
 }

@@ -16,7 +16,7 @@ use crate::math::{Pose, Real, Rotation, Vec3, max, min};
 use crate::narrow_phase::PairCache;
 use crate::parallel::SharedSlice;
 use crate::shape::Shape;
-use crate::simd::{Quad, prefetch};
+use crate::simd::{prefetch, quad_view};
 use crate::storage;
 use std::mem::MaybeUninit;
 
@@ -73,24 +73,16 @@ pub(super) const REUSE_ROTATION: Real = 0.0125;
 const REUSE_REACH: Real = 0.08;
 
 impl Pair {
-    /// The first eleven of twelve numbers: rotation and position of `manifold_pose`, then `manifold_rotation`.
-    #[inline(always)]
-    pub fn quads(&self) -> &[Quad; 3] {
-        const { assert!(std::mem::offset_of!(Self, bodies) + size_of::<u32>() == size_of::<[Quad; 3]>()) };
-        // SAFETY: `repr(C)`; eleven floats, and the place of a body, whose bits are those of some float.
-        unsafe { &*std::ptr::from_ref(self).cast() }
+    quad_view! {
+        /// Rotation and position of `manifold_pose`, then `manifold_rotation`; the twelfth number means nothing.
+        pub fn quads;
+        [3] of (manifold_pose, manifold_rotation, bodies)
     }
 
-    /// The middle of the smaller shape and [`Pair::size`].
-    #[inline(always)]
-    pub fn middle_quad(&self) -> &[Quad; 1] {
-        const {
-            assert!(
-                std::mem::offset_of!(Self, manifold_middle) + size_of::<Vec3>() == std::mem::offset_of!(Self, size)
-            );
-        };
-        // SAFETY: `repr(C)`; four floats.
-        unsafe { &*std::ptr::from_ref(&self.manifold_middle).cast() }
+    quad_view! {
+        /// The middle of the smaller shape and [`Pair::size`].
+        pub fn middle_quad;
+        [1] of (manifold_middle, size)
     }
 
     /// Notes how the bodies stand for which a manifold is made: `between` is the centre frame of body 2 seen from that of

@@ -5,7 +5,7 @@ use super::bodies::world_inverse_inertia;
 use super::collide::shapes_overlap;
 use super::pairs::PairRules;
 use super::timings::{Phase, PhaseClock, Timings};
-use crate::arbiter::{Entry, NONE};
+use crate::arbiter::{Arbiter, Entry, NONE};
 use crate::broad_phase::Boxes;
 use crate::error::{Error, in_range};
 use crate::id::BodyId;
@@ -13,7 +13,7 @@ use crate::math::{Aabb, Real, Vec3, min};
 use crate::parallel::{BlockList, Gather, SharedSlice};
 use crate::solver::{
     BodyMass, BodyMotion, BodyState, IntegrateParameters, IntegrateTarget, Integration, Pass, PassParameters,
-    PrepareContext, Softness, StoreTarget,
+    PrepareContext, RowPart, Softness, StoreTarget,
 };
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -24,8 +24,8 @@ const DEEPEST_REST: Real = 1.97;
 const LEAST_BODIES: usize = 8;
 /// Bodies whose forces a thread looks at at a time.
 const BODIES_PER_BLOCK: usize = 64;
-/// Room in the lists that threads fill, at first.
-const ROOM: usize = 64;
+/// What a thread's list of what it has found has room for from the start.
+const NEWS_PER_THREAD: usize = 64;
 
 /// Rows whose contacts a thread looks at at a time.
 const ROWS_PER_BLOCK: usize = 512;
@@ -246,7 +246,7 @@ impl World {
             self.broad_phase.find_pairs(is_new, found);
             return;
         }
-        self.scratch.found.prepare(threads, ROOM);
+        self.scratch.found.prepare(threads, NEWS_PER_THREAD);
         self.broad_phase.prepare(PARTS_PER_THREAD * threads);
         let (broad_phase, gather) = (&self.broad_phase, &self.scratch.found);
         let work = broad_phase.work();
@@ -349,8 +349,8 @@ impl World {
     fn finalize(&mut self, dt: Real, report: &mut StepReport) {
         let mut gather = std::mem::take(&mut self.scratch.news);
         let mut left = std::mem::take(&mut self.scratch.left);
-        gather.prepare(self.pool.threads(), ROOM);
-        left.prepare(self.pool.threads(), ROOM);
+        gather.prepare(self.pool.threads(), NEWS_PER_THREAD);
+        left.prepare(self.pool.threads(), NEWS_PER_THREAD);
         self.finalize_bodies(dt, &gather, &left);
         // Before the fast: a body that is stopped short moves its boxes back. In any order: the tree comes out the same.
         self.broad_phase.lift(left.list(), Some(&mut self.pool));
@@ -441,25 +441,37 @@ impl World {
 
     /// Drops contacts past the break distance; arbiters that have none left are appended to `empty`, in no particular order.
     fn break_contacts(&mut self, empty: &mut Vec<u32>) {
-        self.scratch.broken.prepare(self.pool.threads(), ROOM);
+        self.scratch.broken.prepare(self.pool.threads(), NEWS_PER_THREAD);
         let (rows, may_break) = (&self.plan.rows, &self.scratch.may_break);
         let (broken, masses) = (&self.scratch.broken, &self.solver_bodies.masses);
         let break_distance = self.scaled.contact_break_distance;
+        let break_one = |arbiter: &mut Arbiter| {
+            let [pose1, pose2] = [arbiter.body1, arbiter.body2].map(|body| masses[body.index as usize].pose());
+            arbiter.data.break_contacts(&pose1, &pose2, break_distance);
+            arbiter.data.usage_mask & 15 == 0
+        };
         let arbiters = SharedSlice::new(self.arbiters.slots_mut());
         self.pool.run(rows.len().div_ceil(ROWS_PER_BLOCK), |block| {
             let mut found = broken.block();
             let range = block * ROWS_PER_BLOCK..((block + 1) * ROWS_PER_BLOCK).min(rows.len());
             for (row, _) in rows[range.clone()].iter().zip(&may_break[range]).filter(|(_, may_break)| **may_break) {
-                // SAFETY: an arbiter has one row.
-                let arbiter = unsafe { arbiters.get_mut(row.arbiter as usize) };
-                let [pose1, pose2] = [arbiter.body1, arbiter.body2].map(|body| masses[body.index as usize].pose());
-                arbiter.data.break_contacts(&pose1, &pose2, break_distance);
-                if arbiter.data.usage_mask & 15 == 0 {
+                // Where the arbiter has other rows, they may be another thread's at this moment: it has to wait.
+                let is_over = row.part != RowPart::Only || {
+                    // SAFETY: the arbiter has this row alone.
+                    break_one(unsafe { arbiters.get_mut(row.arbiter as usize) })
+                };
+                if is_over {
                     found.push(row.arbiter);
                 }
             }
         });
-        empty.append(self.scratch.broken.list());
+        // No other thread is at work here.
+        let (found, arbiters) = (self.scratch.broken.list(), self.arbiters.slots_mut());
+        found.retain(|&index| {
+            let arbiter = &mut arbiters[index as usize];
+            arbiter.data.usage_mask & 15 == 0 || break_one(arbiter)
+        });
+        empty.append(found);
     }
 
     /// Takes out of a list of arbiters without contacts those that go on: their shapes overlap, or they are gone already.

@@ -68,28 +68,65 @@ pub(crate) struct HullPair<'a> {
     margin: Real,
 }
 
-/// Hull (shape 1) against hull.
-pub(crate) fn hull_hull(
-    level: SimdLevel,
-    (a, b): (&ConvexHull, &ConvexHull),
-    pose: &Pose,
-    margin: Real,
-    (cache, manifold): (&mut PairCache, &mut Manifold),
-) {
-    manifold.clear();
-    on_level(level, HullKernel { level, a, b, pose, margin, cache, manifold });
+/// What a hull is held against.
+pub(crate) trait Partner {
+    /// What its view is made of.
+    type Features<'a>
+    where
+        Self: 'a;
+    fn features(&self) -> Self::Features<'_>;
+    fn view<'a>(features: &'a Self::Features<'_>) -> Polyhedron<'a>;
+    fn support(&self) -> Support<'_>;
 }
 
-/// Hull (shape 1) against cuboid.
-pub(crate) fn hull_cuboid(
+impl Partner for ConvexHull {
+    type Features<'a> = &'a Self;
+
+    #[inline(always)]
+    fn features(&self) -> &Self {
+        self
+    }
+
+    #[inline(always)]
+    fn view<'a>(features: &'a &Self) -> Polyhedron<'a> {
+        Polyhedron::from_hull(features)
+    }
+
+    #[inline(always)]
+    fn support(&self) -> Support<'_> {
+        Support::Hull(self)
+    }
+}
+
+impl Partner for Cuboid {
+    type Features<'a> = CuboidFeatures;
+
+    #[inline(always)]
+    fn features(&self) -> CuboidFeatures {
+        CuboidFeatures::new(self)
+    }
+
+    #[inline(always)]
+    fn view(features: &CuboidFeatures) -> Polyhedron<'_> {
+        features.view()
+    }
+
+    #[inline(always)]
+    fn support(&self) -> Support<'_> {
+        Support::Cuboid(*self)
+    }
+}
+
+/// Hull (shape 1) against hull or cuboid.
+pub(crate) fn collide(
     level: SimdLevel,
-    (a, b): (&ConvexHull, &Cuboid),
+    (hull, partner): (&ConvexHull, &impl Partner),
     pose: &Pose,
     margin: Real,
     (cache, manifold): (&mut PairCache, &mut Manifold),
 ) {
     manifold.clear();
-    on_level(level, CuboidKernel { level, a, b, pose, margin, cache, manifold });
+    on_level(level, FirstLook { level, hull, partner, pose, margin, cache, manifold });
 }
 
 /// Runs a kernel with eight lanes where the level has them.
@@ -106,60 +143,33 @@ fn on_level<K: Kernel>(level: SimdLevel, kernel: K) {
     Baseline.run(kernel);
 }
 
-/// [`hull_hull`]: what most pairs that were apart need, before the search.
-struct HullKernel<'a> {
+/// [`collide`]: what most pairs that were apart need, then the search for the others.
+struct FirstLook<'a, P> {
     level: SimdLevel,
-    a: &'a ConvexHull,
-    b: &'a ConvexHull,
+    hull: &'a ConvexHull,
+    partner: &'a P,
     pose: &'a Pose,
     margin: Real,
     cache: &'a mut PairCache,
     manifold: &'a mut Manifold,
 }
 
-impl Kernel for HullKernel<'_> {
+impl<P: Partner> Kernel for FirstLook<'_, P> {
     #[inline(always)]
     fn run(self) {
         let (m, t) = (self.pose.rotation.to_mat3(), self.pose.position);
-        let pair = |a, b| HullPair {
-            polyhedron1: Polyhedron::from_hull(a),
-            polyhedron2: Polyhedron::from_hull(b),
+        let features = self.partner.features();
+        let pair = |hull| HullPair {
+            polyhedron1: Polyhedron::from_hull(hull),
+            polyhedron2: P::view(&features),
             m,
             t,
             margin: self.margin,
         };
-        let Some(known) = pair(self.a, self.b).touches(self.cache.words[0]) else { return };
+        let Some(known) = pair(self.hull).touches(self.cache.words[0]) else { return };
         // Put together anew, so that pairs that are apart need not write down what they do not read.
-        let pair = pair(self.a, self.b);
-        let supports = [Support::Hull(self.a), Support::Hull(self.b)];
-        pair.search(self.level, (self.pose, supports), known, (self.cache, self.manifold));
-    }
-}
-
-/// [`hull_cuboid`]: what most pairs that were apart need, before the search.
-struct CuboidKernel<'a> {
-    level: SimdLevel,
-    a: &'a ConvexHull,
-    b: &'a Cuboid,
-    pose: &'a Pose,
-    margin: Real,
-    cache: &'a mut PairCache,
-    manifold: &'a mut Manifold,
-}
-
-impl Kernel for CuboidKernel<'_> {
-    #[inline(always)]
-    fn run(self) {
-        let features = CuboidFeatures::new(self.b);
-        let pair = HullPair {
-            polyhedron1: Polyhedron::from_hull(self.a),
-            polyhedron2: features.view(),
-            m: self.pose.rotation.to_mat3(),
-            t: self.pose.position,
-            margin: self.margin,
-        };
-        let Some(known) = pair.touches(self.cache.words[0]) else { return };
-        let supports = [Support::Hull(self.a), Support::Cuboid(*self.b)];
+        let pair = pair(self.hull);
+        let supports = [Support::Hull(self.hull), self.partner.support()];
         pair.search(self.level, (self.pose, supports), known, (self.cache, self.manifold));
     }
 }

@@ -16,8 +16,8 @@ use crate::parallel::{BlockList, SharedSlice};
 use crate::shape::Shape;
 use crate::simd::{Kernel, LanePose, LaneRotation, LaneVec3, Lanes, prefetch};
 use crate::solver::BodyMass;
+use crate::storage::FixedList;
 use std::marker::PhantomData;
-use std::mem::MaybeUninit;
 
 /// Words of the active set in a block.
 pub(super) const WORDS_PER_BLOCK: usize = 2;
@@ -70,31 +70,7 @@ impl<'a> BlockPairs<'a> {
 }
 
 /// A list with room for the pairs of a block.
-///
-/// Left blank at first: filling the lists of a block would cost as much as looking at the pairs of one that rests.
-struct Queue<T> {
-    items: [MaybeUninit<T>; PAIRS_PER_BLOCK],
-    count: usize,
-}
-
-impl<T: Copy> Queue<T> {
-    #[inline(always)]
-    fn new() -> Self {
-        Self { items: [const { MaybeUninit::uninit() }; PAIRS_PER_BLOCK], count: 0 }
-    }
-
-    #[inline(always)]
-    fn push(&mut self, item: T) {
-        self.items[self.count] = MaybeUninit::new(item);
-        self.count += 1;
-    }
-
-    #[inline(always)]
-    fn items(&self) -> &[T] {
-        // SAFETY: `push` has written the first `count`, and `MaybeUninit<T>` lies in memory as `T` does.
-        unsafe { std::slice::from_raw_parts(self.items.as_ptr().cast(), self.count) }
-    }
-}
+type Queue<T> = FixedList<T, PAIRS_PER_BLOCK>;
 
 /// A pair that needs a new manifold.
 #[derive(Clone, Copy)]
@@ -139,15 +115,15 @@ impl<W: Lanes<L>, const L: usize> Kernel for BlockKernel<'_, W, L> {
     fn run(mut self) {
         let near = self.drop_parted();
         let mut fresh = Queue::new();
-        for chunk in near.items().chunks(L) {
+        for chunk in near.as_slice().chunks(L) {
             self.keep_manifolds(chunk, &mut fresh);
         }
         let (mut cuboids, mut others) = (Queue::new(), Queue::new());
-        for item in fresh.items() {
+        for item in fresh.as_slice() {
             if self.is_of_cuboids(item) { cuboids.push(*item) } else { others.push(*item) }
         }
-        self.collide_cuboids(cuboids.items());
-        for item in others.items() {
+        self.collide_cuboids(cuboids.as_slice());
+        for item in others.as_slice() {
             self.collide_anew(item);
         }
     }
@@ -284,7 +260,7 @@ impl<W: Lanes<L>, const L: usize> BlockKernel<'_, W, L> {
             self.test_axes(chunk, &mut near);
         }
         let (mut manifold, mut places) = (WideManifold::EMPTY, [Places::NONE; L]);
-        for chunk in near.items().chunks(L) {
+        for chunk in near.as_slice().chunks(L) {
             self.clip_faces(chunk, &mut manifold, &mut places);
         }
     }
