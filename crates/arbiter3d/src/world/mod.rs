@@ -103,6 +103,8 @@ pub struct World {
     narrow: collide::NarrowPhaseScratch,
     wake_scratch: Vec<u32>,
     index_scratch: Vec<u32>,
+    /// Where fast bodies stop.
+    stops: Vec<Option<Pose>>,
     member_scratch: Vec<(u32, u32)>,
 }
 
@@ -173,6 +175,7 @@ impl World {
             narrow: collide::NarrowPhaseScratch::default(),
             wake_scratch: Vec::new(),
             index_scratch: Vec::new(),
+            stops: Vec::new(),
             member_scratch: Vec::new(),
         };
         world.solver_bodies.push();
