@@ -17,7 +17,7 @@ pub type States = Vec<Option<State>>;
 pub struct Quality {
     /// Mean height of the dynamic bodies' origins, metres.
     pub mean_height: f64,
-    /// Largest overlap of any contact, metres.
+    /// Largest overlap of any contact, metres: the median over some moments of the last steps.
     pub deepest_penetration: f64,
     /// Points nearer than the speculative distance, by our narrow phase.
     pub points: usize,
@@ -37,8 +37,19 @@ pub struct Quality {
     pub not_finite: usize,
 }
 
-/// Measures where an engine has left the bodies of a scene.
-pub fn measure(scene: &Scene, states: &States) -> Result<Quality, Error> {
+/// Measures where an engine has left the bodies of a scene; of the depth, the median over that moment and some `earlier` ones.
+pub fn measure(scene: &Scene, states: &States, earlier: &[States]) -> Result<Quality, Error> {
+    let mut quality = measure_moment(scene, states)?;
+    let mut depths = vec![quality.deepest_penetration];
+    for states in earlier {
+        depths.push(measure_moment(scene, states)?.deepest_penetration);
+    }
+    depths.sort_unstable_by(f64::total_cmp);
+    quality.deepest_penetration = depths[depths.len() / 2];
+    Ok(quality)
+}
+
+fn measure_moment(scene: &Scene, states: &States) -> Result<Quality, Error> {
     let bodies: Vec<(&Body, Option<State>)> = scene.all_bodies().zip(states.iter().copied()).collect();
     let mut quality = Quality { mean_height: mean_height(&bodies), ..Quality::default() };
     let bounds = Bounds::of(scene);
@@ -198,13 +209,13 @@ mod tests {
     #[test]
     fn depth_height_drift_and_energy_are_those_of_the_poses() {
         let (scene, mut states) = scene("large_pyramid", 2);
-        let untouched = measure(&scene, &states).unwrap();
+        let untouched = measure(&scene, &states, &[]).unwrap();
         assert!(untouched.deepest_penetration < 1e-4, "{untouched:?}");
         assert_eq!((untouched.awake, untouched.lost), (3, 0));
         let top = states.last_mut().unwrap().as_mut().unwrap();
         top.position += Vec3::new(0.0, -0.05, 0.03);
         top.linear_velocity = Vec3::X * 2.0;
-        let quality = measure(&scene, &states).unwrap();
+        let quality = measure(&scene, &states, &[]).unwrap();
         assert!((quality.deepest_penetration - 0.05).abs() < 1e-4, "{quality:?}");
         assert!((quality.mean_height - (0.5 + 0.5 + 1.45) / 3.0).abs() < 1e-6, "{quality:?}");
         assert!((quality.drift - 0.03).abs() < 1e-6 && (quality.drift_z - 0.03).abs() < 1e-6, "{quality:?}");
@@ -219,7 +230,7 @@ mod tests {
         states[1].as_mut().unwrap().position.y = -3.0;
         states[2].as_mut().unwrap().position.x = Real::NAN;
         states[3].as_mut().unwrap().position.z = 5000.0;
-        let quality = measure(&scene, &states).unwrap();
+        let quality = measure(&scene, &states, &[]).unwrap();
         assert_eq!((quality.lost, quality.not_finite), (3, 1), "{quality:?}");
     }
 }

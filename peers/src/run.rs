@@ -6,6 +6,11 @@ use crate::scene::Scene;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;
 
+/// Steps before the end at which the depth of contacts is looked at too: where bodies tumble, that of one moment is chance.
+const MOMENTS: [usize; 4] = [80, 60, 40, 20];
+/// Scenes with more bodies are looked at only at the end.
+const MOST_BODIES: usize = 50_000;
+
 /// What one run gave.
 #[derive(Debug, Default)]
 pub struct Run {
@@ -13,6 +18,8 @@ pub struct Run {
     pub steps: Vec<f64>,
     /// Where the bodies ended.
     pub states: States,
+    /// Where they were at [`MOMENTS`] before.
+    pub earlier: Vec<States>,
     /// The engine's own count of contacts.
     pub contacts: Option<usize>,
     /// Bytes that the engine held at the end.
@@ -63,6 +70,10 @@ pub fn run(kind: Kind, scene: &Scene, threads: usize, max_seconds: f64, note: &d
 
 fn try_run(kind: Kind, scene: &Scene, threads: usize, max_seconds: f64, note: &dyn Fn(usize)) -> Result<Run, String> {
     let mut run = Run { steps: Vec::with_capacity(scene.steps), ..Run::default() };
+    // Before bytes are counted.
+    let bodies = scene.all_bodies().count();
+    let room = if bodies <= MOST_BODIES { bodies } else { 0 };
+    run.earlier.extend(MOMENTS.iter().map(|_| States::with_capacity(room)));
     let before = held_before(kind);
     let mut engine = build(kind, scene, threads)?;
     let mut script = scene.script.iter().peekable();
@@ -80,6 +91,11 @@ fn try_run(kind: Kind, scene: &Scene, threads: usize, max_seconds: f64, note: &d
         }
         run.bytes = engine.bytes().map(|bytes| bytes - before);
         run.peak_bytes = run.peak_bytes.max(run.bytes);
+        if let Some(moment) = MOMENTS.iter().position(|ahead| step + 1 + ahead == scene.steps)
+            && bodies <= MOST_BODIES
+        {
+            run.earlier[moment].extend((0..count(scene, script.len())).map(|body| engine.state(body)));
+        }
         note(step + 1);
         if let Err(reason) = result {
             run.stopped = Some(format!("step {step}: {reason}"));
@@ -92,14 +108,15 @@ fn try_run(kind: Kind, scene: &Scene, threads: usize, max_seconds: f64, note: &d
         }
     }
     run.contacts = engine.contacts();
-    let spawned = scene.script.len() - script.len();
-    let count = scene.bodies.len() + spawns(&scene.script[..spawned]);
-    run.states = (0..count).map(|body| engine.state(body)).collect();
+    run.states = (0..count(scene, script.len())).map(|body| engine.state(body)).collect();
+    run.earlier.retain(|states| !states.is_empty());
     Ok(run)
 }
 
-fn spawns(script: &[(usize, crate::scene::Change)]) -> usize {
-    script.iter().filter(|(_, change)| matches!(change, crate::scene::Change::Spawn(_))).count()
+/// Bodies that there are while `left` changes of the script are still to come.
+fn count(scene: &Scene, left: usize) -> usize {
+    let done = &scene.script[..scene.script.len() - left];
+    scene.bodies.len() + done.iter().filter(|(_, change)| matches!(change, crate::scene::Change::Spawn(_))).count()
 }
 
 /// What the engine's byte count says before its world exists.

@@ -92,7 +92,7 @@ impl Row {
             return;
         }
         (self.contacts, self.bytes, self.timed_out) = (run.contacts, [run.bytes, run.peak_bytes], run.timed_out);
-        match measure(scene, &run.states) {
+        match measure(scene, &run.states, &run.earlier) {
             Ok(quality) => {
                 self.quality = quality;
                 self.failure = judge(outcome, scene, &run, &quality);

@@ -25,7 +25,7 @@ use super::hull_builder::{Lattice, TriangulatedHull};
 use super::hull_features::{HullFeatures, LANES};
 use super::hull_merge::{Outline, simplify, triangles_as_outlines};
 use super::{MassProperties, ShapeError, positive};
-use crate::math::{Aabb, Real, SymmetricMat3, Vec3};
+use crate::math::{Aabb, Pose, Real, SymmetricMat3, Vec3};
 use glam::DVec3;
 use std::collections::BTreeMap;
 
@@ -269,6 +269,12 @@ impl ConvexHull {
     #[inline(always)]
     pub(crate) fn features(&self) -> &HullFeatures {
         &self.features
+    }
+
+    /// The box around the hull placed by `pose`: that of its corners.
+    pub(crate) fn aabb(&self, pose: &Pose) -> Aabb {
+        let [min, max] = self.features.extremes(&pose.rotation.to_mat3());
+        Aabb { min: pose.position + min, max: pose.position + max }
     }
 
     pub(crate) fn local_aabb(&self) -> Aabb {

@@ -9,7 +9,8 @@
 //! a face. Per corner: the faces around it, in the order of their half edges.
 
 use super::hull::{HalfEdge, Plane};
-use crate::math::{Real, Vec3, min};
+use crate::math::{Mat3, Real, Vec3, max, min};
+use crate::simd::{KernelOfEight, Lanes, run_eight};
 
 /// Corners or faces of a group.
 pub(crate) const LANES: usize = 8;
@@ -80,7 +81,46 @@ pub(crate) struct HullFeatures {
     pub outer_radius: Real,
 }
 
+/// [`HullFeatures::extremes`].
+struct ExtremesKernel<'a> {
+    corners: &'a [CornerGroup],
+    rotation: &'a Mat3,
+    found: &'a mut [Vec3; 2],
+}
+
+impl KernelOfEight for ExtremesKernel<'_> {
+    #[inline(always)]
+    fn run<W: Lanes<LANES>>(self) {
+        for axis in 0..3 {
+            let row = self.rotation.row(axis);
+            let (x, y, z) = (W::splat(row.x), W::splat(row.y), W::splat(row.z));
+            let (mut least, mut most) = (W::splat(Real::MAX), W::splat(-Real::MAX));
+            for corners in self.corners {
+                let along = W::from_array(corners.x) * x + W::from_array(corners.y) * y + W::from_array(corners.z) * z;
+                (least, most) = (along.min(least), along.max(most));
+            }
+            let (mut least, mut most) = (least.to_array(), most.to_array());
+            // Halves against each other, which the compiler does side by side.
+            for half in [4, 2, 1] {
+                for lane in 0..half {
+                    least[lane] = min(least[lane + half], least[lane]);
+                    most[lane] = max(most[lane + half], most[lane]);
+                }
+            }
+            (self.found[0][axis], self.found[1][axis]) = (least[0], most[0]);
+        }
+    }
+}
+
 impl HullFeatures {
+    /// The least and the largest coordinates of the corners turned by `rotation`.
+    #[inline]
+    pub(crate) fn extremes(&self, rotation: &Mat3) -> [Vec3; 2] {
+        let mut found = [Vec3::ZERO; 2];
+        run_eight(ExtremesKernel { corners: &self.corners, rotation, found: &mut found });
+        found
+    }
+
     pub(crate) fn new(vertices: &[Vec3], planes: &[Plane], edges: &[HalfEdge], center: Vec3) -> Self {
         let arcs = arcs(planes, edges);
         let (ring_starts, ring_faces) = rings(vertices.len(), edges);

@@ -191,7 +191,7 @@ impl Shape {
             Self::Sphere(s) => Aabb::from_center(pose.position, Vec3::splat(s.radius())),
             Self::Capsule(s) => s.aabb(pose),
             Self::Cuboid(s) => s.aabb(pose),
-            Self::Hull(s) => s.local_aabb().transform(pose),
+            Self::Hull(s) => s.aabb(pose),
             Self::Mesh(s) => s.local_aabb().transform(pose),
         }
     }

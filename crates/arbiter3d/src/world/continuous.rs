@@ -15,36 +15,47 @@
 //! Source: conservative advancement, Mirtich, "Impulse-based Dynamic Simulation", 1996.
 
 use super::World;
+use super::bodies::Body;
 use super::definition::BodyKind;
+use super::settings::WorldSettings;
 use super::shapes::ShapeSlot;
+use crate::broad_phase::BroadPhase;
 use crate::math::{Aabb, Pose, Real, Vec3, max, min};
 use crate::narrow_phase::{Support, Sweep, gap, time_of_impact};
+use crate::parallel::SharedSlice;
 use crate::shape::{Capsule, Cuboid, MeshSides, Shape, Sphere, TriangleMesh};
+use crate::solver::SolverBodies;
 
 impl World {
-    /// Stops a fast body at the first static shape on its way.
-    pub(crate) fn stop_at_impact(&mut self, index: u32) {
-        let body = &self.bodies[index as usize];
-        let state = &self.solver_bodies.states[index as usize];
-        let end = self.solver_bodies.masses[index as usize].pose();
-        // The start of the step, at the centre of mass: the rotation by the step's rotation vector undone.
-        let start = Pose::new(end.position - state.translation, end.rotation.integrate(-state.turn));
-        let center = Pose::from_position(body.mass.center);
-        let from_center = center.inverse();
-        let turn = state.turn.length();
-        let mut first: Real = 1.0;
-        for &slot in &body.shape_slots {
-            let shape = &self.shapes[slot as usize];
-            let on_body = from_center.mul(&shape.pose);
-            if !shape.sensor
-                && let Some(mover) = Mover::new(shape, &start, &end, &on_body).filter(|mover| mover.is_fast(turn))
-            {
-                first = min(self.first_impact(&mover, first), first);
+    /// Stops fast bodies at the first static shapes on their ways.
+    pub(crate) fn stop_at_impacts(&mut self, fast: &[u32]) {
+        if fast.is_empty() {
+            return;
+        }
+        let mut stops = std::mem::take(&mut self.stops);
+        stops.clear();
+        crate::storage::reserve(&mut stops, fast.len());
+        stops.resize(fast.len(), None);
+        let places = SharedSlice::new(&mut stops);
+        let search = ImpactSearch {
+            shapes: &self.shapes,
+            bodies: &self.bodies,
+            solver: &self.solver_bodies,
+            broad_phase: &self.broad_phase,
+            settings: &self.scaled,
+        };
+        self.pool.run_ranges(fast.len(), 1, |range| {
+            for at in range {
+                // SAFETY: each place belongs to one run.
+                unsafe { *places.get_mut(at) = search.stop_of(fast[at]) };
+            }
+        });
+        for (&index, stop) in fast.iter().zip(&stops) {
+            if let Some(at) = stop {
+                self.stop_at(index, at);
             }
         }
-        if first < 1.0 {
-            self.stop_at(index, &start.interpolate(&end, first));
-        }
+        self.stops = stops;
     }
 
     /// Puts a body, given the frame of its centre of mass, where it was stopped.
@@ -62,13 +73,45 @@ impl World {
         }
         self.bodies[index as usize].shape_slots = slots;
     }
+}
+
+/// What a search for impacts reads.
+struct ImpactSearch<'a> {
+    shapes: &'a [ShapeSlot],
+    bodies: &'a [Body],
+    solver: &'a SolverBodies,
+    broad_phase: &'a BroadPhase,
+    settings: &'a WorldSettings,
+}
+
+impl ImpactSearch<'_> {
+    /// Where the centre frame of a body is to be stopped, if it is.
+    fn stop_of(&self, index: u32) -> Option<Pose> {
+        let body = &self.bodies[index as usize];
+        let state = &self.solver.states[index as usize];
+        let end = self.solver.masses[index as usize].pose();
+        // The start of the step, at the centre of mass: the rotation by the step's rotation vector undone.
+        let start = Pose::new(end.position - state.translation, end.rotation.integrate(-state.turn));
+        let way = Way { start, end, turn: state.turn.length() };
+        let mut first: Real = 1.0;
+        for &slot in &body.shape_slots {
+            let shape = &self.shapes[slot as usize];
+            if !shape.sensor
+                && way.is_fast(shape)
+                && let Some(mover) = Mover::new(shape, &way)
+            {
+                first = min(self.first_impact(&mover, first), first);
+            }
+        }
+        (first < 1.0).then(|| start.interpolate(&end, first))
+    }
 
     /// Fraction of the path at which a shape first comes within a slop of a static one; `limit` if it does not.
     ///
     /// Nothing stops a shape but what its core would hit, so that alone is looked for.
     fn first_impact(&self, mover: &Mover<'_>, limit: Real) -> Real {
         let mut first = limit;
-        let near = 2.0 * self.scaled.slop;
+        let near = 2.0 * self.settings.slop;
         self.broad_phase.query_static(&mover.core_box(near), |slot| {
             let other = &self.shapes[slot as usize];
             let body = &self.bodies[other.body as usize];
@@ -111,7 +154,7 @@ impl World {
 
     /// First impact with a convex shape at the origin.
     fn impact(&self, fixed: &Support<'_>, mover: &Mover<'_>) -> Option<Real> {
-        let (still, slop) = (Sweep::still(Pose::IDENTITY), self.scaled.slop);
+        let (still, slop) = (Sweep::still(Pose::IDENTITY), self.settings.slop);
         // A violent step before can have pushed the core in: then its very middle stays on this side.
         let pushed_in = gap(fixed, &mover.core, &mover.core_path.start) <= 0.0;
         let middle = mover.middle();
@@ -120,11 +163,38 @@ impl World {
         if pushed_in && gap(fixed, inside, &mover.core_path.start) <= inside.radius() {
             return Some(0.0); // no nearer: half the gap in each step is nothing in the end
         }
-        if gap(fixed, &mover.support, &mover.path.start) <= self.scaled.speculative_distance {
+        if gap(fixed, &mover.support, &mover.path.start) <= self.settings.speculative_distance {
             return Some(core);
         }
         let surface = time_of_impact(fixed, &still, &mover.support, &mover.path, slop);
         Some(surface.map_or(core, |surface| min(surface, core)))
+    }
+}
+
+/// The way of a body's centre frame through a step.
+struct Way {
+    start: Pose,
+    end: Pose,
+    /// By how much it has turned, radians.
+    turn: Real,
+}
+
+impl Way {
+    /// Whether some point of a shape's core has moved so far that its surface may have been passed. Of a body of many shapes (a tree
+    /// that falls) most have not.
+    fn is_fast(&self, shape: &ShapeSlot) -> bool {
+        let thickness = 0.5 * shape.geometry.inner_radius();
+        // How far the core reaches out from its middle, beyond a ball of its thickness.
+        let (middle, length) = match &shape.geometry {
+            Shape::Sphere(_) => (Vec3::ZERO, 0.0),
+            Shape::Capsule(s) => (Vec3::ZERO, s.half_length()),
+            Shape::Cuboid(s) => (Vec3::ZERO, (s.half_extents() - Vec3::splat(thickness)).length() - thickness),
+            Shape::Hull(hull) => (hull.centroid(), 0.0),
+            Shape::Mesh(_) => return false,
+        };
+        let middle = shape.from_center.transform_point(middle);
+        let moved = (self.end.transform_point(middle) - self.start.transform_point(middle)).length();
+        moved + self.turn * length > thickness
     }
 }
 
@@ -141,8 +211,8 @@ struct Mover<'a> {
 }
 
 impl<'a> Mover<'a> {
-    /// A shape that sits at `on_body`, the body's frame moving from `start` to `end`; `None` for a mesh.
-    fn new(shape: &'a ShapeSlot, start: &Pose, end: &Pose, on_body: &Pose) -> Option<Self> {
+    /// `None` for a mesh.
+    fn new(shape: &'a ShapeSlot, way: &Way) -> Option<Self> {
         let thickness = 0.5 * shape.geometry.inner_radius();
         let (core, center) = match &shape.geometry {
             Shape::Sphere(_) => (Support::Sphere(Sphere::new(thickness).ok()?), Vec3::ZERO),
@@ -154,7 +224,8 @@ impl<'a> Mover<'a> {
             Shape::Mesh(_) => return None,
         };
         // A hull's frame may be far from the hull (a part of a tree is given about the tree's foot): it turns about its middle.
-        let path = Sweep { start: start.mul(on_body), end: end.mul(on_body), pivot: center };
+        let on_body = &shape.from_center;
+        let path = Sweep { start: way.start.mul(on_body), end: way.end.mul(on_body), pivot: center };
         let to_middle = Pose::from_position(center);
         let core_path = Sweep { start: path.start.mul(&to_middle), end: path.end.mul(&to_middle), pivot: Vec3::ZERO };
         Some(Self { shape, support: Support::new(&shape.geometry)?, path, thickness, core, core_path })
@@ -163,13 +234,6 @@ impl<'a> Mover<'a> {
     /// A small ball in the middle of the core.
     fn middle(&self) -> Support<'a> {
         Sphere::new(0.1 * self.thickness).map_or(self.core, Support::Sphere)
-    }
-
-    /// Whether some point of the core has moved so far, in a step in which the body has turned by `turn`, that the surface
-    /// may have been passed. Of a body of many shapes (a tree that falls) most have not.
-    fn is_fast(&self, turn: Real) -> bool {
-        let moved = (self.core_path.end.position - self.core_path.start.position).length();
-        moved + turn * (self.core.reach(Vec3::ZERO) - self.thickness) > self.thickness
     }
 
     /// How far a point of the core may bulge out of the chord of its arc. At radius `r` and a turn by `θ` that is

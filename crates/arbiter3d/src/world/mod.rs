@@ -106,6 +106,8 @@ pub struct World {
     narrow: collide::NarrowPhaseScratch,
     wake_scratch: Vec<u32>,
     index_scratch: Vec<u32>,
+    /// Where fast bodies stop.
+    stops: Vec<Option<Pose>>,
     member_scratch: Vec<(u32, u32)>,
     /// Bodies of new pairs, and whether one is awake.
     tie_scratch: Vec<([u32; 2], bool)>,
@@ -179,6 +181,7 @@ impl World {
             narrow: collide::NarrowPhaseScratch::default(),
             wake_scratch: Vec::new(),
             index_scratch: Vec::new(),
+            stops: Vec::new(),
             member_scratch: Vec::new(),
             tie_scratch: Vec::new(),
         };

@@ -20,8 +20,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Overlap of the most heavily loaded contact at rest, in slops. A light body under a heavy pile would sink deeper into its
 /// soft springs: to 3 cm, measured on 1,000 mixed bodies.
 const DEEPEST_REST: Real = 1.97;
-/// Bodies that a thread takes at a time.
+/// Bodies that a thread takes at a time at least: of many shapes each, a few are much work.
+const LEAST_BODIES: usize = 8;
+/// Bodies whose forces a thread takes at a time.
 const BODIES_PER_BLOCK: usize = 64;
+/// Room in the lists that threads fill, at first.
+const ROOM: usize = 64;
 
 /// Rows whose contacts a thread looks at at a time.
 const ROWS_PER_BLOCK: usize = 512;
@@ -68,6 +72,8 @@ pub(crate) struct StepScratch {
     pairs: Vec<(u32, u32)>,
     may_break: Vec<bool>,
     news: Gather<BodyNews>,
+    /// Bodies that may have passed something.
+    fast: Vec<u32>,
     /// Shapes whose boxes have left their fat boxes in this step, then all that have since the last narrow phase.
     left: Gather<u32>,
     moved: Vec<u32>,
@@ -179,7 +185,7 @@ impl World {
         let masses = &self.solver_bodies.masses;
         let (blocks, broad_phase) = (awake.len().div_ceil(BODIES_PER_BLOCK), &mut self.broad_phase);
         let accelerate_block = |block: usize| {
-            for &body in block_of(awake, block) {
+            for &body in awake.iter().skip(block * BODIES_PER_BLOCK).take(BODIES_PER_BLOCK) {
                 let index = body as usize;
                 // SAFETY: a body stands in the list once.
                 let (body, state, motion) =
@@ -239,7 +245,7 @@ impl World {
             self.broad_phase.find_pairs(is_new, found);
             return;
         }
-        self.scratch.found.prepare(threads, BODIES_PER_BLOCK);
+        self.scratch.found.prepare(threads, ROOM);
         self.broad_phase.prepare(PARTS_PER_THREAD * threads);
         let (broad_phase, gather) = (&self.broad_phase, &self.scratch.found);
         let work = broad_phase.work();
@@ -342,8 +348,8 @@ impl World {
     fn finalize(&mut self, dt: Real, report: &mut StepReport) {
         let mut gather = std::mem::take(&mut self.scratch.news);
         let mut left = std::mem::take(&mut self.scratch.left);
-        gather.prepare(self.pool.threads(), BODIES_PER_BLOCK);
-        left.prepare(self.pool.threads(), BODIES_PER_BLOCK);
+        gather.prepare(self.pool.threads(), ROOM);
+        left.prepare(self.pool.threads(), ROOM);
         self.finalize_bodies(dt, &gather, &left);
         // Before the fast: a body that is stopped short moves its boxes back. In any order: the tree comes out the same.
         self.broad_phase.lift(left.list(), Some(&mut self.pool));
@@ -355,15 +361,19 @@ impl World {
             BodyNews::Broken(body) => (0, body),
             BodyNews::Fast(body) => (1, body),
         });
+        let mut fast = std::mem::take(&mut self.scratch.fast);
         for item in news.drain(..) {
             match item {
                 BodyNews::Broken(body) => {
                     self.freeze(body);
                     report.frozen.push(self.body_id(body));
                 }
-                BodyNews::Fast(body) => self.stop_at_impact(body),
+                BodyNews::Fast(body) => fast.push(body),
             }
         }
+        self.stop_at_impacts(&fast);
+        fast.clear();
+        self.scratch.fast = fast;
         self.scratch.news = gather;
     }
 
@@ -381,10 +391,10 @@ impl World {
         let states = SharedSlice::new(&mut self.solver_bodies.states);
         let motions = SharedSlice::new(&mut self.solver_bodies.motions);
         let masses = SharedSlice::new(&mut self.solver_bodies.masses);
-        self.pool.run(awake.len().div_ceil(BODIES_PER_BLOCK), |block| {
+        self.pool.run_ranges(awake.len(), LEAST_BODIES, |range| {
             let mut found = (news.block(), left.block());
             let mut any_rested = false;
-            for &index in block_of(awake, block) {
+            for &index in &awake[range] {
                 let at = index as usize;
                 // SAFETY: a body stands in the list once.
                 let (body, state, motion, mass) =
@@ -430,7 +440,7 @@ impl World {
 
     /// Drops contacts past the break distance; arbiters that have none left are appended to `empty`, in no particular order.
     fn break_contacts(&mut self, empty: &mut Vec<u32>) {
-        self.scratch.broken.prepare(self.pool.threads(), BODIES_PER_BLOCK);
+        self.scratch.broken.prepare(self.pool.threads(), ROOM);
         let (rows, may_break) = (&self.plan.rows, &self.scratch.may_break);
         let (broken, masses) = (&self.scratch.broken, &self.solver_bodies.masses);
         let break_distance = self.scaled.contact_break_distance;
@@ -480,12 +490,6 @@ impl World {
         });
         self.scratch.over = over;
     }
-}
-
-/// A thread's share of the awake bodies.
-fn block_of(awake: &[u32], block: usize) -> &[u32] {
-    let start = block * BODIES_PER_BLOCK;
-    &awake[start..(start + BODIES_PER_BLOCK).min(awake.len())]
 }
 
 /// What finalizing a body reads.
