@@ -198,6 +198,12 @@ pub(crate) struct Entry {
 
 impl Entry {
     const NONE: Self = Self { key: ArbiterKey::new(0, 0), index: NONE, generation: 0 };
+
+    /// Whether the arbiter that was meant is awake.
+    #[inline(always)]
+    fn is_live(&self, awake: &[u64]) -> bool {
+        awake[self.index as usize] == u64::from(self.generation)
+    }
 }
 
 /// Arbiters that a thread makes at a time.
@@ -205,6 +211,8 @@ const NEW_PER_BLOCK: usize = 16;
 /// How many arbiters ahead of its making what an arbiter touches is asked for.
 const NEW_AHEAD: usize = 8;
 
+/// Arbiters in the solving order from which on it is merged in halves.
+const LEAST_HALVED: usize = 2048;
 /// Arbiters that a thread ends at a time.
 const ENDS_PER_BLOCK: usize = 16;
 /// How many arbiters ahead of its end what an arbiter touches is asked for.
@@ -453,10 +461,10 @@ impl ArbiterStore {
     }
 
     /// Brings the solving order up to date and returns it: awake arbiters by key.
-    pub fn awake_by_key(&mut self) -> &[Entry] {
+    pub fn awake_by_key(&mut self, pool: Option<&mut StagePool>) -> &[Entry] {
         self.fresh_peak.note(self.fresh.len());
         if self.stale || !self.fresh.is_empty() {
-            self.merge_fresh();
+            self.merge_fresh(pool);
         }
         if let Some(count) = self.fresh_peak.end_step() {
             storage::shrink(&mut self.fresh, count);
@@ -464,24 +472,37 @@ impl ArbiterStore {
         &self.sorted
     }
 
-    /// Merges the arbiters that have woken into the solving order, and drops those that sleep or have ended.
-    fn merge_fresh(&mut self) {
-        let awake = &self.awake;
-        let live = |entry: &&Entry| awake[entry.index as usize] == u64::from(entry.generation);
-        self.fresh.retain(|entry| live(&entry));
+    /// Merges the arbiters that have woken into the solving order, and drops those that sleep or have ended: the upper half
+    /// beside the lower one where there are threads for both.
+    fn merge_fresh(&mut self, pool: Option<&mut StagePool>) {
+        let awake = &self.awake[..];
+        self.fresh.retain(|entry| entry.is_live(awake));
         self.fresh.sort_unstable_by_key(|entry| entry.key);
-        self.merged.clear();
-        storage::reserve(&mut self.merged, self.sorted.len() + self.fresh.len());
-        let mut fresh = self.fresh.iter().peekable();
-        for entry in self.sorted.iter().filter(live) {
-            while let Some(new) = fresh.next_if(|new| new.key <= entry.key) {
-                push_unique(&mut self.merged, *new);
-            }
-            push_unique(&mut self.merged, *entry);
+        let (sorted, fresh) = (&self.sorted[..], &self.fresh[..]);
+        let pool = pool.filter(|pool| pool.active_threads() > 1 && sorted.len() >= LEAST_HALVED);
+        let cut = if pool.is_some() { sorted.len() / 2 } else { sorted.len() };
+        let fresh_cut = sorted.get(cut).map_or(fresh.len(), |entry| fresh.partition_point(|new| new.key < entry.key));
+        let (middle, count) = (cut + fresh_cut, sorted.len() + fresh.len());
+        storage::reserve(&mut self.merged, count);
+        self.merged.resize(count, Entry::NONE);
+        let (low, high) = self.merged.split_at_mut(middle);
+        let (mut lower, mut upper) = (0, 0);
+        if let Some(pool) = pool {
+            let upper_part = SharedSlice::new(high);
+            let told = SharedSlice::new(std::slice::from_mut(&mut upper));
+            let merge_upper = |_: usize| {
+                // SAFETY: the only item of its stage.
+                unsafe {
+                    let part = upper_part.range_mut(0, count - middle);
+                    *told.get_mut(0) = merge(&sorted[cut..], &fresh[fresh_cut..], awake, part);
+                }
+            };
+            pool.run_beside(1, merge_upper, || lower = merge(&sorted[..cut], &fresh[..fresh_cut], awake, low));
+        } else {
+            lower = merge(sorted, fresh, awake, low);
         }
-        for new in fresh {
-            push_unique(&mut self.merged, *new);
-        }
+        self.merged.copy_within(middle..middle + upper, lower);
+        self.merged.truncate(lower + upper);
         std::mem::swap(&mut self.sorted, &mut self.merged);
         self.fresh.clear();
         self.stale = false;
@@ -527,11 +548,25 @@ impl ArbiterStore {
     }
 }
 
-/// Appends an entry unless it is there already: an arbiter that slept and woke since the last merge stands in both lists.
-fn push_unique(list: &mut Vec<Entry>, entry: Entry) {
-    if list.last() != Some(&entry) {
-        list.push(entry);
+/// Merges two lists in key order without what is not awake, and returns the number of entries. What slept and woke since the
+/// last merge stands in both lists: it is taken once.
+fn merge(sorted: &[Entry], fresh: &[Entry], awake: &[u64], merged: &mut [Entry]) -> usize {
+    let mut count = 0;
+    let mut add = |entry: Entry| {
+        if count == 0 || merged[count - 1] != entry {
+            merged[count] = entry;
+            count += 1;
+        }
+    };
+    let mut fresh = fresh.iter().peekable();
+    for entry in sorted.iter().filter(|entry| entry.is_live(awake)) {
+        while let Some(new) = fresh.next_if(|new| new.key <= entry.key) {
+            add(*new);
+        }
+        add(*entry);
     }
+    fresh.for_each(|new| add(*new));
+    count
 }
 
 #[cfg(test)]
@@ -547,14 +582,41 @@ mod tests {
         let mut store = ArbiterStore::default();
         let c = store.create(ArbiterKey::new(3, 1), body(1), body(2));
         let a = store.create(ArbiterKey::new(1, 2), body(1), body(3));
-        assert_eq!(store.awake_by_key().iter().map(|e| e.index).collect::<Vec<_>>(), [a, c]);
+        assert_eq!(store.awake_by_key(None).iter().map(|e| e.index).collect::<Vec<_>>(), [a, c]);
         store.remove(c);
         let b = store.create(ArbiterKey::new(1, 3), body(2), body(3));
         assert_eq!(b, c, "the place is reused");
         store.set_awake(a, false);
         store.set_awake(a, true);
-        assert_eq!(store.awake_by_key().iter().map(|e| e.index).collect::<Vec<_>>(), [a, b]);
+        assert_eq!(store.awake_by_key(None).iter().map(|e| e.index).collect::<Vec<_>>(), [a, b]);
         store.validate().unwrap();
+    }
+
+    /// 6,000 arbiters made together, of which a third ends, as many begin and some sleep: halves merged by two threads are the
+    /// order that one thread finds.
+    #[test]
+    fn many_arbiters_come_and_go_alike_on_any_number_of_threads() {
+        let orders = [1, 2, 3].map(|threads| {
+            let (mut store, mut pool) = (ArbiterStore::default(), StagePool::new(threads));
+            let name = |nth: usize| Name {
+                key: ArbiterKey::new((nth * 7919 % 6007) as u64, nth as u64),
+                bodies: [body(nth as u32 % 50), body(50 + nth as u32 % 61)],
+            };
+            store.create_many(6000, 111, &mut pool, name, |nth, arbiter| arbiter.pair = nth as u32);
+            assert_eq!(store.awake_by_key(Some(&mut pool)).len(), 6000);
+            let ended: Vec<u32> = store.iter().map(|a| a.id.index).filter(|index| index % 3 == 0).collect();
+            store.remove_many(&ended, &mut pool, |nth, arbiter| assert_eq!(arbiter.id.index, ended[nth]));
+            store.create_many(2500, 111, &mut pool, |nth| name(6000 + nth), |nth, arbiter| arbiter.pair = nth as u32);
+            for index in (0..6000).step_by(10) {
+                let alive = store.at(index).alive;
+                store.set_awake(index, false);
+                store.set_awake(index, alive && index % 20 == 0);
+            }
+            store.validate().unwrap();
+            store.awake_by_key(Some(&mut pool)).iter().map(|e| (e.key, e.generation)).collect::<Vec<_>>()
+        });
+        assert!(orders[0].is_sorted() && orders[0].len() == 6500 - 300, "{}", orders[0].len());
+        assert!(orders[1] == orders[0] && orders[2] == orders[0]);
     }
 
     #[test]

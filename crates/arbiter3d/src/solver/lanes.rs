@@ -284,10 +284,9 @@ impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> Kernel for Sto
             for lane in 0..count as usize {
                 let row = first as usize + lane;
                 let source = &target.rows[row];
-                // SAFETY: rows of one arbiter share its bodies, so they stand in different groups, and groups are stored
-                // one after the other; those of the serial group are stored by one thread.
-                let arbiter = unsafe { target.arbiters.get_mut(source.arbiter as usize) };
-                store_lane(&outcome, &solved, lane, source, arbiter);
+                let arbiter = target.arbiters.at(source.arbiter as usize);
+                // SAFETY: rows of one arbiter have different slots, and only one is the first.
+                unsafe { store_lane(&outcome, &solved, lane, source, arbiter) };
                 // SAFETY: each row belongs to one run alone.
                 *unsafe { target.may_break.get_mut(row) } = outcome.excess[lane] > 0.0;
             }
@@ -479,17 +478,15 @@ impl<I: Instructions, W: Lanes<L>, const L: usize> ContactSolver for LaneSolver<
         };
         let level = self.level;
         let (one, two, four) = (self.one.share(), self.two.share(), self.four.share());
-        for index in 0..target.plan.groups.len() {
-            for_each_run::<L>(&self.deals[index], self.serial[index], pool, |class, run| {
-                // SAFETY: each run is visited once.
-                unsafe {
-                    match class {
-                        0 => level.run(StoreKernel { rows: one.run(run), target: shared }),
-                        1 => level.run(StoreKernel { rows: two.run(run), target: shared }),
-                        _ => level.run(StoreKernel { rows: four.run(run), target: shared }),
-                    }
+        for_each_run::<L>(&self.all, false, pool, |class, run| {
+            // SAFETY: each run is visited once.
+            unsafe {
+                match class {
+                    0 => level.run(StoreKernel { rows: one.run(run), target: shared }),
+                    1 => level.run(StoreKernel { rows: two.run(run), target: shared }),
+                    _ => level.run(StoreKernel { rows: four.run(run), target: shared }),
                 }
-            });
-        }
+            }
+        });
     }
 }

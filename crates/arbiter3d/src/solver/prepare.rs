@@ -519,25 +519,30 @@ pub(crate) unsafe fn read_row<W: Lanes<L>, const L: usize, const P: usize, const
 }
 
 /// Writes impulses and gaps of one lane to its arbiter.
+///
+/// # Safety
+/// No other thread may touch the slots of this row in the arbiter, nor, if the row is the first, its rolling impulse.
 #[inline(always)]
-pub(crate) fn store_lane<W: Lanes<L>, const L: usize, const P: usize, const C: usize>(
+pub(crate) unsafe fn store_lane<W: Lanes<L>, const L: usize, const P: usize, const C: usize>(
     outcome: &Outcome<L, P>,
     solved: &SolvedRow<'_, W, L, P, C>,
     lane: usize,
     source: &RowSource,
-    arbiter: &mut Arbiter,
+    arbiter: *mut Arbiter,
 ) {
     let mut slots = source.slots;
     for point in 0..P {
         if slots == 0 {
             break;
         }
-        let contact = &mut arbiter.data.slots[slots.trailing_zeros() as usize % SLOTS];
+        // SAFETY: promised by the caller.
+        let contact = unsafe { &mut (*arbiter).data.slots[slots.trailing_zeros() as usize % SLOTS] };
         let quads = contact.quads_mut();
         (quads[2], quads[3]) = (outcome.thirds[point][lane], outcome.fourths[point][lane]);
         slots &= slots - 1;
     }
     if let (true, Some(extra)) = (source.is_first() && solved.features.rolling, solved.extra) {
-        arbiter.data.rolling_impulse = extra.rolling_impulse.get(lane);
+        // SAFETY: promised by the caller.
+        unsafe { (*arbiter).data.rolling_impulse = extra.rolling_impulse.get(lane) };
     }
 }

@@ -159,7 +159,7 @@ impl World {
     /// Joins awake bodies along their contacts as they are now.
     fn join_islands(&mut self, finder: &mut crate::island::IslandFinder) {
         finder.reset(self.bodies.len(), self.awake.iter().copied());
-        self.arbiters.awake_by_key();
+        self.arbiters.awake_by_key(None);
         for entry in self.arbiters.order() {
             let arbiter = self.arbiters.at(entry.index);
             let (a, b) = (arbiter.body1.index, arbiter.body2.index);

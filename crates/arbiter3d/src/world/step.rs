@@ -270,7 +270,7 @@ impl World {
     }
 
     fn plan_rows(&mut self) {
-        self.arbiters.awake_by_key();
+        self.arbiters.awake_by_key(Some(&mut self.pool));
         let (order, arbiters) = self.arbiters.order_and_slots_mut();
         self.plan.build(order, arbiters, &self.solver_bodies, &mut self.pool);
     }
