@@ -36,8 +36,9 @@ const PARTS_PER_THREAD: usize = 16;
 
 /// Awake bodies, pairs and arbiters from which on a step uses several threads: below, waiting for each other costs more.
 const WORK_FOR_THREADS: usize = 1500;
-/// Milliseconds of the last step from which on threads pay off, however few the bodies.
-const TIME_FOR_THREADS: f64 = 0.3;
+/// Milliseconds of the last step from which on threads pay off, however few the bodies; and down to which they do, where they took
+/// part in that step.
+const TIME_FOR_THREADS: [f64; 2] = [0.1, 0.07];
 
 /// Stiffest spring of a contact, as a share of the substep rate: past it, tall stacks ring.
 const MAX_CONTACT_RATE: Real = 0.1875;
@@ -71,6 +72,8 @@ enum BodyNews {
 pub(crate) struct StepScratch {
     pairs: Vec<(u32, u32)>,
     may_break: Vec<bool>,
+    /// Whether the last step was done on several threads.
+    shared: bool,
     news: Gather<BodyNews>,
     /// Bodies that may have passed something.
     fast: Vec<u32>,
@@ -118,7 +121,9 @@ impl World {
         let mut clock = PhaseClock::start();
         let work = self.awake.len() + self.active_pairs.len() + self.arbiters.order().len();
         // Few bodies can be much work too: meshes. What the last step took tells.
-        self.pool.begin_step(work >= WORK_FOR_THREADS || self.timings.total() > TIME_FOR_THREADS);
+        let enough = TIME_FOR_THREADS[usize::from(self.scratch.shared)];
+        self.scratch.shared = work >= WORK_FOR_THREADS || self.timings.total() > enough;
+        self.pool.begin_step(self.scratch.shared);
         self.events.begin_step();
         self.flush_events();
         self.apply_forces();
