@@ -180,8 +180,8 @@ struct Way {
 }
 
 impl Way {
-    /// Whether some point of a shape's core has moved so far that its surface may have been passed. Of a body of many shapes (a tree
-    /// that falls) most have not.
+    /// Whether some point of a shape's core has moved so far that its surface may have been passed. Of a body of many shapes
+    /// (a tree that falls) most have not.
     fn is_fast(&self, shape: &ShapeSlot) -> bool {
         let thickness = 0.5 * shape.geometry.inner_radius();
         // How far the core reaches out from its middle, beyond a ball of its thickness.

@@ -173,8 +173,8 @@ impl World {
 
 /// What decides whether two shapes may have a pair.
 pub(crate) struct PairRules<'a> {
-    pub shapes: &'a [super::shapes::ShapeSlot],
-    pub bodies: &'a [super::bodies::Body],
+    pub shapes: &'a [ShapeSlot],
+    pub bodies: &'a [Body],
 }
 
 impl PairRules<'_> {

@@ -36,8 +36,8 @@ const PARTS_PER_THREAD: usize = 16;
 
 /// Awake bodies, pairs and arbiters from which on a step uses several threads: below, waiting for each other costs more.
 const WORK_FOR_THREADS: usize = 1500;
-/// Milliseconds of the last step from which on threads pay off, however few the bodies; and down to which they do, where they took
-/// part in that step.
+/// Milliseconds of the last step from which on threads pay off, however few the bodies; and down to which they do, where they
+/// took part in that step.
 const TIME_FOR_THREADS: [f64; 2] = [0.1, 0.07];
 
 /// Stiffest spring of a contact, as a share of the substep rate: past it, tall stacks ring.

@@ -198,13 +198,7 @@ impl World {
         let ids = begin.bodies.map(|body| self.body_id(body));
         let arbiter = self.arbiters.at_mut(index);
         if [arbiter.body1, arbiter.body2] == ids {
-            let filler = Filler {
-                shapes: &self.shapes,
-                bodies: &self.bodies,
-                masses: &self.solver_bodies.masses,
-                break_distance: self.scaled.contact_break_distance,
-                reusable: self.filters.contact.is_none(),
-            };
+            let filler = Filler::new((&self.shapes, &self.bodies), &self.solver_bodies, &self.scaled, &self.filters);
             let pair = &mut self.pairs[begin.pair as usize];
             (arbiter.pair, pair.arbiter) = (begin.pair, index);
             filler.fill(begin, pair, &mut arbiter.data);
@@ -214,13 +208,7 @@ impl World {
 
     /// Makes arbiters with contacts and materials, their begins still to be raised.
     fn create_arbiters(&mut self, begins: &[Begin], order: &[(ArbiterKey, u32)]) {
-        let filler = Filler {
-            shapes: &self.shapes,
-            bodies: &self.bodies,
-            masses: &self.solver_bodies.masses,
-            break_distance: self.scaled.contact_break_distance,
-            reusable: self.filters.contact.is_none(),
-        };
+        let filler = Filler::new((&self.shapes, &self.bodies), &self.solver_bodies, &self.scaled, &self.filters);
         let first = self.events.unbegun.len();
         storage::reserve(&mut self.events.unbegun, first + order.len());
         self.events
@@ -262,7 +250,17 @@ struct Filler<'a> {
     reusable: bool,
 }
 
-impl Filler<'_> {
+impl<'a> Filler<'a> {
+    fn new(
+        (shapes, bodies): (&'a [ShapeSlot], &'a [Body]),
+        solver: &'a SolverBodies,
+        settings: &WorldSettings,
+        filters: &UserFilters,
+    ) -> Self {
+        let (break_distance, reusable) = (settings.contact_break_distance, filters.contact.is_none());
+        Self { shapes, bodies, masses: &solver.masses, break_distance, reusable }
+    }
+
     fn fill(&self, begin: &Begin, pair: &mut Pair, data: &mut ContactData) {
         let rotations = begin.bodies.map(|body| self.masses[body as usize].rotation);
         update_contacts(data, &begin.places, rotations, self.break_distance);
