@@ -53,6 +53,11 @@ async function seek(page, frame) {
     slider.value = value;
     slider.dispatchEvent(new Event('input', { bubbles: true }));
   }, frame);
+  await drawn(page, frame);
+}
+
+/** Waits until the picture shows `frame`. */
+async function drawn(page, frame) {
   await page.waitForFunction((wanted) => replay.shown.frame === wanted && !replay.stage.dirty, frame);
 }
 
@@ -221,6 +226,7 @@ const LAWS = {
 const CONTAINER_LAWS = {
   async 'a click goes through see-through walls, and ends at solid ones'({ page, expected }) {
     await page.keyboard.press('Home');
+    await drawn(page, 0);
     const nearest = await page.evaluate(() => {
       const camera = replay.stage.camera.position;
       const away = (body) => Math.hypot(...replay.bodyAt(body).position.map((x, i) => x - camera.getComponent(i)));
@@ -228,11 +234,12 @@ const CONTAINER_LAWS = {
     });
     const { screen } = await page.evaluate((body) => replay.bodyAt(body), nearest);
     await page.mouse.click(...screen);
+    await page.locator('#panel').waitFor();
     assert.equal(await page.evaluate(() => replay.selected), nearest);
     await picture(page, 'container');
     await page.locator('#see-through').uncheck();
     await page.mouse.click(...screen);
-    await page.waitForFunction(() => !document.getElementById('panel').hidden);
+    await page.waitForFunction((ball) => replay.selected !== ball, nearest);
     assert.equal(await page.evaluate(() => replay.nameOf(replay.selected)), expected.container);
     await page.locator('#see-through').check();
   },
