@@ -39,6 +39,7 @@ mod shape;
 mod simd;
 mod solver;
 mod storage;
+mod vehicle;
 mod world;
 
 pub use arbiter::{Arbiter, ArbiterId, ArbiterKey, Contact, ContactData, ContactPoint, EndReason, SolveMode};
@@ -48,6 +49,10 @@ pub use shape::{
     TriangleMesh,
 };
 pub use simd::{SimdLevel, UnknownSimdLevel};
+pub use vehicle::{
+    AntiRollBar, Suspension, Tyre, Vehicle, VehicleControls, VehicleDefinition, WheelContact, WheelDefinition,
+    WheelState,
+};
 pub use world::{
     BeginEvent, BeginListener, BodyDefinition, BodyId, BodyKind, BodyMut, BodyRef, CombineRule, ContactFilter,
     ContactProvider, EndEvent, EndListener, Error, Filter, LockedAxes, Material, PairFilter, Phase, QueryFilter,
