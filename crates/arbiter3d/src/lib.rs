@@ -24,6 +24,7 @@
 
 mod arbiter;
 mod broad_phase;
+mod buoyancy;
 mod edge_lists;
 mod error;
 #[cfg(doctest)]
@@ -43,6 +44,7 @@ mod vehicle;
 mod world;
 
 pub use arbiter::{Arbiter, ArbiterId, ArbiterKey, Contact, ContactData, ContactPoint, EndReason, SolveMode};
+pub use buoyancy::{FluidDefinition, FluidSurface, FluidVolume, Submersion};
 pub use query::{Ray, ShapeHit, cast_ray};
 pub use shape::{
     Capsule, ConvexHull, Cuboid, HalfEdge, MassProperties, MeshRayHit, MeshSides, Plane, Shape, ShapeError, Sphere,

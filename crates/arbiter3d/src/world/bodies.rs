@@ -686,6 +686,12 @@ impl World {
         Ok(())
     }
 
+    /// Lists the awake bodies, in no particular order.
+    pub(crate) fn list_awake(&self, list: &mut Vec<BodyId>) {
+        list.clear();
+        list.extend(self.awake.iter().map(|&index| self.body_id(index)));
+    }
+
     /// Copies kind, mass and pose of a body into the solver's records.
     pub(crate) fn refresh_solver_body(&mut self, index: u32) {
         let body = &self.bodies[index as usize];

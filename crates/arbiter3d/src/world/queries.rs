@@ -144,6 +144,11 @@ impl World {
         })
     }
 
+    /// Whether a query with this filter sees a shape.
+    pub(crate) fn filter_accepts(&self, filter: &QueryFilter, shape: ShapeId) -> bool {
+        self.shape_slot(shape).is_ok_and(|slot| self.sees(filter, slot))
+    }
+
     fn sees(&self, filter: &QueryFilter, slot: u32) -> bool {
         let shape = &self.shapes[slot as usize];
         filter.mask & shape.filter.category != 0
