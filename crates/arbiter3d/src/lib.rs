@@ -25,6 +25,7 @@
 mod arbiter;
 mod broad_phase;
 mod buoyancy;
+mod character;
 mod edge_lists;
 mod error;
 #[cfg(doctest)]
@@ -45,7 +46,11 @@ mod world;
 
 pub use arbiter::{Arbiter, ArbiterId, ArbiterKey, Contact, ContactData, ContactPoint, EndReason, SolveMode};
 pub use buoyancy::{FluidDefinition, FluidSurface, FluidVolume, Submersion};
-pub use query::{Ray, ShapeHit, cast_ray};
+pub use character::{
+    CharacterController, CharacterSettings, ContactPlane, Ground, PlaneLimit, PlaneSolution, ShapeMover, SlideResult,
+    solve_planes,
+};
+pub use query::{Ray, ShapeCast, ShapeDistance, ShapeHit, cast_ray, distance, overlaps};
 pub use shape::{
     Capsule, ConvexHull, Cuboid, HalfEdge, MassProperties, MeshRayHit, MeshSides, Plane, Shape, ShapeError, Sphere,
     TriangleMesh,
@@ -56,8 +61,8 @@ pub use vehicle::{
     WheelState,
 };
 pub use world::{
-    BeginEvent, BeginListener, BodyDefinition, BodyId, BodyKind, BodyMut, BodyRef, CombineRule, ContactFilter,
-    ContactProvider, EndEvent, EndListener, Error, Filter, LockedAxes, Material, PairFilter, Phase, QueryFilter,
-    RayHit, SensorEvent, ShapeDefinition, ShapeId, ShapeMut, ShapePair, ShapeRef, StepContext, StepReport, Timings,
-    UNIT_TOLERANCE, World, WorldSettings,
+    BeginEvent, BeginListener, BodyDefinition, BodyId, BodyKind, BodyKinds, BodyMut, BodyRef, CastHit, CombineRule,
+    ContactFilter, ContactProvider, EndEvent, EndListener, Error, Filter, LockedAxes, Material, PairFilter, Phase,
+    PointHit, QueryFilter, RayHit, SensorEvent, ShapeContacts, ShapeDefinition, ShapeId, ShapeMut, ShapePair,
+    ShapePredicate, ShapeRef, StepContext, StepReport, Timings, UNIT_TOLERANCE, World, WorldSettings,
 };

@@ -121,7 +121,8 @@ fn rising_bodies_reach_their_terminal_speed() {
         for round in [true, false] {
             let mut world = sleepless();
             let shape = if round { sphere(0.5) } else { cube(0.5) };
-            let (volume, shadow) = if round { (0.523_599, 0.785_398) } else { (1.0, 1.0) };
+            let (volume, shadow) =
+                if round { (std::f32::consts::FRAC_PI_6, std::f32::consts::FRAC_PI_4) } else { (1.0, 1.0) };
             let body = drop_in(&mut world, shape, density, Vec3::Y * -200.0, Quat::IDENTITY);
             run(&mut world, &mut fluid, 10.0);
             let lift = (1.0 - density / 1000.0) * GRAVITY;

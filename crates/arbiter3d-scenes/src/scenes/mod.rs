@@ -1,12 +1,15 @@
 //! The scenes, by what they are made of.
 
 pub(crate) mod behaviour;
+pub(crate) mod character;
 pub(crate) mod colosseum;
 pub(crate) mod drums;
 pub(crate) mod fields;
+pub(crate) mod fluids;
 pub(crate) mod piles;
 pub(crate) mod stacks;
 pub(crate) mod trees;
+pub(crate) mod vehicles;
 
 #[cfg(test)]
 mod tests;

@@ -37,6 +37,9 @@ fn scenes_have_their_published_counts() {
         ("ramps", None, 11),
         ("bounce", None, 11),
         ("t_handle", None, 1),
+        ("vehicle_track", None, 9),
+        ("buoyancy_pool", None, 64),
+        ("character_course", None, 1),
     ];
     for (name, size, count) in counts {
         assert_eq!(dynamic(&built(name, size).world).len(), count, "{name}");

@@ -4,7 +4,9 @@
 //! as they run against the direction of the surface, one triangle from a common corner to each edge closes it, in whatever
 //! order the edges come. The result is closed again, so the next plane may follow, and the divergence theorem gives
 //!
-//!     V = Σ a·(b × c) / 6        V x = Σ (a + b + c)/4 · a·(b × c) / 6
+//! ```text
+//! V = Σ a·(b × c) / 6        V x = Σ (a + b + c)/4 · a·(b × c) / 6
+//! ```
 //!
 //! over the triangles `a b c`, wound counter-clockwise from outside. Exact for every closed surface, convex or not.
 //! Source: Catto, "Buoyancy", Game Programming Gems 6, 2006 (one plane); the closing of the hole is folklore.

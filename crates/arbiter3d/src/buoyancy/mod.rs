@@ -104,7 +104,7 @@ pub struct FluidDefinition {
     /// Drag that grows with the square of spin: that rate per rad/s (0 to 10⁴). Default 0.2.
     pub quadratic_angular_drag: Real,
     /// Which shapes feel it. Default all but sensors.
-    pub filter: QueryFilter,
+    pub filter: QueryFilter<'static>,
 }
 
 impl Default for FluidDefinition {
@@ -186,7 +186,7 @@ pub struct Submersion {
 /// let mut world = World::default();
 /// let buoy = world.add_body(&BodyDefinition::dynamic().at(Vec3::new(0.0, -2.0, 0.0)))?;
 /// world.add_shape(buoy, &ShapeDefinition::new(Shape::sphere(0.5)?).density(500.0))?;
-/// let mut water = FluidVolume::new(FluidDefinition::default())?;
+/// let mut water = FluidVolume::new(FluidDefinition { linear_drag: 2.0, ..FluidDefinition::default() })?;
 /// for _ in 0..600 {
 ///     water.update(&mut world, 1.0 / 60.0)?;
 ///     world.step(1.0 / 60.0)?;

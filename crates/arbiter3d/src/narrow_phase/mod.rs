@@ -29,7 +29,7 @@ mod triangle_lanes;
 mod triangle_solid;
 
 pub(crate) use cuboid::{CuboidLanes, CuboidPair, Near as NearCuboids, WideManifold};
-pub(crate) use distance::Support;
+pub(crate) use distance::{Cast, CastPoint, Support, closest, linear_cast};
 pub(crate) use time_of_impact::{Sweep, gap, time_of_impact};
 
 pub use manifold::{Manifold, ManifoldPoint};

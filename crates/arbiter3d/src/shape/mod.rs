@@ -24,7 +24,7 @@ pub use mass::MassProperties;
 pub(crate) use mesh::Facet;
 pub use mesh::{MeshRayHit, MeshSides, TriangleMesh};
 pub(crate) use mesh_edges::Surroundings;
-pub(crate) use mesh_tree::{LEAF, Leaves};
+pub(crate) use mesh_tree::{Descent, LEAF, Leaves, Slabs, box_distances};
 pub use sphere::Sphere;
 
 use crate::math::{Aabb, Pose, Real, Vec3};

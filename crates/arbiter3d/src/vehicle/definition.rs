@@ -185,7 +185,7 @@ pub struct AntiRollBar {
 /// let car = VehicleDefinition::car(0.8, 1.4, -0.2);
 /// assert_eq!(car.wheels.len(), 4);
 /// ```
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct VehicleDefinition {
     /// Unit vector ahead in the frame of the chassis. Default −z.
     pub forward: Vec3,
@@ -201,7 +201,7 @@ pub struct VehicleDefinition {
     /// Drag of the air, `½ ρ c A`, in N per (m/s)² (0 to 10⁶); it acts at the centre of mass. Default 0.4.
     pub drag: Real,
     /// What the wheels find; the chassis itself is always left out. Default everything but sensors.
-    pub filter: QueryFilter,
+    pub filter: QueryFilter<'static>,
 }
 
 impl Default for VehicleDefinition {

@@ -84,7 +84,7 @@ impl Wheel {
         world: &World,
         chassis: &Pose,
         up: Vec3,
-        filter: &QueryFilter,
+        filter: &QueryFilter<'_>,
     ) -> Result<bool, Error> {
         let definition = &self.definition;
         let full = definition.suspension.rest_length + definition.radius;
