@@ -65,30 +65,24 @@ pub struct ShapeHit {
 }
 
 impl ShapeHit {
-    const INSIDE: Self = Self { fraction: 0.0, normal: Vec3::ZERO };
+    pub(crate) const INSIDE: Self = Self { fraction: 0.0, normal: Vec3::ZERO };
 }
 
 /// The first point of a shape along a ray given in the shape's frame.
 ///
-/// Meshes have no inside: see the ray cast of the triangle mesh.
+/// Meshes have no inside; their own ray cast also tells the triangle.
 #[must_use]
 pub fn cast_ray(shape: &Shape, ray: &Ray) -> Option<ShapeHit> {
-    match shape {
-        Shape::Sphere(sphere) => cast_sphere(sphere.radius(), ray),
-        Shape::Capsule(capsule) => cast_capsule(capsule, ray),
-        Shape::Cuboid(cuboid) => cast_cuboid(cuboid, ray),
-        Shape::Hull(hull) => cast_planes(hull.planes(), ray),
-        Shape::Mesh(_) => None,
-    }
+    shape.geometry().cast_ray(ray)
 }
 
 /// A hit, if it lies on the ray.
-fn hit_at(fraction: Real, normal: Vec3, ray: &Ray) -> Option<ShapeHit> {
+pub(crate) fn hit_at(fraction: Real, normal: Vec3, ray: &Ray) -> Option<ShapeHit> {
     (fraction >= 0.0 && fraction <= ray.max_fraction).then_some(ShapeHit { fraction, normal })
 }
 
 /// Where a ray from outside enters the ball of a radius about the origin, and the point there.
-fn enter_ball(radius: Real, origin: Vec3, direction: Vec3) -> Option<(Real, Vec3)> {
+pub(crate) fn enter_ball(radius: Real, origin: Vec3, direction: Vec3) -> Option<(Real, Vec3)> {
     let length = direction.length();
     // A zero direction gives NaN here, which misses below.
     let unit = direction / length;
@@ -106,7 +100,7 @@ fn enter_ball(radius: Real, origin: Vec3, direction: Vec3) -> Option<(Real, Vec3
     Some((distance / length, closest - unit * half_chord))
 }
 
-fn cast_sphere(radius: Real, ray: &Ray) -> Option<ShapeHit> {
+pub(crate) fn cast_sphere(radius: Real, ray: &Ray) -> Option<ShapeHit> {
     if ray.origin.length_squared() < radius * radius {
         return Some(ShapeHit::INSIDE);
     }
@@ -116,7 +110,7 @@ fn cast_sphere(radius: Real, ray: &Ray) -> Option<ShapeHit> {
 
 /// The line first enters the infinite cylinder about y. Within the segment that is the hit. Past an end, everything that
 /// follows inside the cylinder reaches the capsule through the ball at that end, so the ball decides.
-fn cast_capsule(capsule: &Capsule, ray: &Ray) -> Option<ShapeHit> {
+pub(crate) fn cast_capsule(capsule: &Capsule, ray: &Ray) -> Option<ShapeHit> {
     let (radius, half_length) = (capsule.radius(), capsule.half_length());
     let (origin, direction) = (ray.origin, ray.direction);
     let on_axis = Vec3::new(0.0, crate::math::clamp(origin.y, -half_length, half_length), 0.0);
@@ -177,7 +171,7 @@ impl Clip {
     }
 }
 
-fn cast_cuboid(cuboid: &Cuboid, ray: &Ray) -> Option<ShapeHit> {
+pub(crate) fn cast_cuboid(cuboid: &Cuboid, ray: &Ray) -> Option<ShapeHit> {
     let half_extents = cuboid.half_extents();
     let mut clip = Clip::new(ray);
     for (axis, normal) in [Vec3::X, Vec3::Y, Vec3::Z].into_iter().enumerate() {
@@ -189,7 +183,7 @@ fn cast_cuboid(cuboid: &Cuboid, ray: &Ray) -> Option<ShapeHit> {
     clip.hit()
 }
 
-fn cast_planes(planes: &[Plane], ray: &Ray) -> Option<ShapeHit> {
+pub(crate) fn cast_planes(planes: &[Plane], ray: &Ray) -> Option<ShapeHit> {
     let mut clip = Clip::new(ray);
     for plane in planes {
         let height = plane.normal.dot(ray.origin) - plane.offset;

@@ -8,10 +8,12 @@
 //! functions in double precision: both sides of a shared edge compute the same number with opposite sign, so a ray
 //! cannot slip through between them.
 
-use super::ShapeError;
+use super::geometry::Geometry;
 use super::mesh_edges::{Adjacency, Surface, Surroundings};
 use super::mesh_tree::{LEAF, Leaves, MeshTree, Slabs};
+use super::{MassProperties, ShapeError};
 use crate::math::{Aabb, Real, Vec3, max3, min3};
+use crate::query::{self, ShapeHit};
 use crate::simd::{LaneVec3, Lanes, Quad};
 use glam::DVec3;
 
@@ -316,6 +318,25 @@ impl<F: FnMut(Vec3) -> bool> Leaves for Ends<'_, F> {
                 }
             }
         }
+    }
+}
+
+impl Geometry for TriangleMesh {
+    fn local_aabb(&self) -> Aabb {
+        self.local_aabb()
+    }
+
+    fn mass_properties(&self, _: Real) -> Result<MassProperties, ShapeError> {
+        Err(ShapeError::NoVolume { shape: "a mesh", advice: "put it on a static or kinematic body" })
+    }
+
+    fn inner_ball(&self) -> (Vec3, Real) {
+        (self.local_aabb().center(), 0.0)
+    }
+
+    fn cast_ray(&self, ray: &query::Ray) -> Option<ShapeHit> {
+        let hit = self.cast_ray(ray.origin, ray.direction, ray.max_fraction)?;
+        Some(ShapeHit { fraction: hit.distance, normal: hit.normal })
     }
 }
 

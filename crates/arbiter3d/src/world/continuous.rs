@@ -190,7 +190,7 @@ impl Way {
             Shape::Capsule(s) => (Vec3::ZERO, s.half_length()),
             Shape::Cuboid(s) => (Vec3::ZERO, (s.half_extents() - Vec3::splat(thickness)).length() - thickness),
             Shape::Hull(hull) => (hull.centroid(), 0.0),
-            Shape::Mesh(_) => return false,
+            other => (other.inner_ball().0, 0.0),
         };
         let middle = shape.from_center.transform_point(middle);
         let moved = (self.end.transform_point(middle) - self.start.transform_point(middle)).length();
@@ -221,7 +221,7 @@ impl<'a> Mover<'a> {
                 (Support::Cuboid(Cuboid::new(s.half_extents() - Vec3::splat(thickness)).ok()?), Vec3::ZERO)
             }
             Shape::Hull(hull) => (Support::Sphere(Sphere::new(thickness).ok()?), hull.centroid()),
-            Shape::Mesh(_) => return None,
+            other => (Support::Sphere(Sphere::new(thickness).ok()?), other.inner_ball().0),
         };
         // A hull's frame may be far from the hull (a part of a tree is given about the tree's foot): it turns about its middle.
         let on_body = &shape.from_center;
