@@ -59,6 +59,7 @@ pub(crate) fn closest(shape1: &Support, shape2: &Support, pose: &Pose) -> Option
     if v.length_squared() == 0.0 {
         v = DVec3::X;
     }
+    let mut point1 = DVec3::ZERO;
     let mut size = 0.0;
     let mut shortest = f64::MAX;
     for _ in 0..MAX_ROUNDS {
@@ -72,20 +73,22 @@ pub(crate) fn closest(shape1: &Support, shape2: &Support, pose: &Pose) -> Option
         }
         simplex.push(corner);
         if !simplex.reduce() {
+            if v.dot(w) > 0.0 {
+                break; // All corners are on one side of the origin: a tetrahedron that holds it is flat, and rounding.
+            }
             return None;
         }
-        v = simplex.point();
-        let squared = v.length_squared();
+        let nearer = simplex.point();
+        let squared = nearer.length_squared();
         if squared <= TOUCHING * TOUCHING * size {
             return None;
         }
         if squared >= shortest {
-            break; // Rounding: no closer any more.
+            break; // Rounding: no closer any more. A simplex of corners that almost coincide can even be farther.
         }
-        shortest = squared;
+        (v, point1, shortest) = (nearer, simplex.witness(), squared);
     }
     let distance = v.length();
-    let point1 = simplex.witness();
     Some(Closest {
         point1: point1.as_vec3(),
         point2: (point1 + v).as_vec3(),

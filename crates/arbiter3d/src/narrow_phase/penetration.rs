@@ -20,6 +20,8 @@ use glam::DVec3;
 const GAIN: f64 = 1e-7;
 /// What is thinner than this share of its size is flat.
 const FLAT: f64 = 1e-9;
+/// A triangle is a sliver if twice its area is less than this share of the square of its longest edge.
+const SLIVER: f64 = 1e-10;
 /// A polyhedron of `n` corners has `2n − 4` faces, and a corner adds two; all are kept, the dead ones too.
 const MAX_CORNERS: usize = 96;
 const MAX_FACES: usize = 512;
@@ -45,9 +47,9 @@ struct Corner {
 #[derive(Clone, Copy)]
 struct Face {
     corners: [u16; 3],
-    /// Outward unit normal; zero for a face without area, which is never looked at.
+    /// Outward unit normal; zero for a sliver, which is never looked at and goes with the first neighbour that goes.
     normal: DVec3,
-    /// `normal · x` on the face.
+    /// `normal · x` on the face; the largest number there is for a sliver.
     offset: f64,
     alive: bool,
 }
@@ -166,8 +168,11 @@ impl Polytope {
         let [a, b, c] = corners.map(|i| self.corners[i as usize].difference);
         let cross = (b - a).cross(c - a);
         let length = cross.length();
-        let normal = if length > 0.0 { cross / length } else { DVec3::ZERO };
-        let offset = if length > 0.0 { normal.dot(a) } else { f64::MAX };
+        let longest = larger(larger((b - a).length_squared(), (c - a).length_squared()), (c - b).length_squared());
+        // The normal of a sliver is rounding.
+        let good = length > SLIVER * longest;
+        let normal = if good { cross / length } else { DVec3::ZERO };
+        let offset = if good { normal.dot(a) } else { f64::MAX };
         self.faces[self.face_count] = Face { corners, normal, offset, alive: true };
         self.face_count += 1;
     }
@@ -183,41 +188,40 @@ impl Polytope {
         best
     }
 
-    /// Takes in a corner that a face sees; false if there is no room, or rounding leaves no clean outline.
+    /// Takes in a corner that a face sees; false if there is no room for it.
+    ///
+    /// What goes is the connected patch of faces that see the corner: among flat faces rounding would have others see it
+    /// too, here and there.
     fn expand(&mut self, seen: usize, corner: Corner) -> bool {
-        if self.corner_count == MAX_CORNERS {
+        let mut outline = Outline { edges: [[0; 2]; MAX_HORIZON], count: 0 };
+        let mut patch = [seen as u16; MAX_HORIZON];
+        let (mut patch_count, mut grows) = (1, true);
+        if self.corner_count == MAX_CORNERS || !outline.cross(self.faces[seen].corners) {
             return false;
         }
-        let mut edges = [[0_u16; 2]; MAX_HORIZON];
-        let mut count = 0;
-        for index in 0..self.face_count {
-            let face = self.faces[index];
-            let sees = face.normal.dot(corner.difference) > face.offset || index == seen;
-            if !(face.alive && sees) {
-                continue;
-            }
-            self.faces[index].alive = false;
-            for k in 0..3 {
-                let (a, b) = (face.corners[k], face.corners[(k + 1) % 3]);
-                // An edge between two faces that go is not on the outline.
-                if let Some(twin) = edges[..count].iter().position(|edge| *edge == [b, a]) {
-                    count -= 1;
-                    edges[twin] = edges[count];
-                } else if count == MAX_HORIZON {
-                    return false;
-                } else {
-                    edges[count] = [a, b];
-                    count += 1;
+        while grows {
+            grows = false;
+            for (index, face) in self.faces[..self.face_count].iter().enumerate() {
+                let sliver = face.offset == f64::MAX;
+                let sees = face.alive && (sliver || face.normal.dot(corner.difference) > face.offset);
+                if sees && outline.touches(face.corners) && !patch[..patch_count].contains(&(index as u16)) {
+                    if patch_count == MAX_HORIZON || !outline.cross(face.corners) {
+                        return false;
+                    }
+                    patch[patch_count] = index as u16;
+                    patch_count += 1;
+                    grows = true;
                 }
             }
         }
-        if self.face_count + count > MAX_FACES {
+        if self.face_count + outline.count > MAX_FACES {
             return false;
         }
+        patch[..patch_count].iter().for_each(|&index| self.faces[index as usize].alive = false);
         let index = self.corner_count as u16;
         self.corners[self.corner_count] = corner;
         self.corner_count += 1;
-        edges[..count].iter().for_each(|&[a, b]| self.push_face([a, b, index]));
+        outline.edges[..outline.count].iter().for_each(|&[a, b]| self.push_face([a, b, index]));
         true
     }
 
@@ -235,6 +239,39 @@ impl Polytope {
             a.point1
         };
         Penetration { point1: point1.as_vec3(), normal: face.normal.as_vec3(), depth: larger(height, 0.0) as Real }
+    }
+}
+
+/// The edges around a patch of faces, in the sense of those.
+struct Outline {
+    edges: [[u16; 2]; MAX_HORIZON],
+    count: usize,
+}
+
+impl Outline {
+    fn twin(&self, [a, b]: [u16; 2]) -> Option<usize> {
+        self.edges[..self.count].iter().position(|edge| *edge == [b, a])
+    }
+
+    /// Whether a face shares an edge with the patch.
+    fn touches(&self, [a, b, c]: [u16; 3]) -> bool {
+        [[a, b], [b, c], [c, a]].into_iter().any(|edge| self.twin(edge).is_some())
+    }
+
+    /// Adds a face to the patch; false if there is no room.
+    fn cross(&mut self, [a, b, c]: [u16; 3]) -> bool {
+        for edge in [[a, b], [b, c], [c, a]] {
+            if let Some(twin) = self.twin(edge) {
+                self.count -= 1;
+                self.edges[twin] = self.edges[self.count];
+            } else if self.count == MAX_HORIZON {
+                return false;
+            } else {
+                self.edges[self.count] = edge;
+                self.count += 1;
+            }
+        }
+        true
     }
 }
 
