@@ -220,7 +220,7 @@ pub(crate) enum AxisSpec {
     RotationZ,
 }
 
-/// A shape on a body: exactly one of `sphere`, `capsule`, `cuboid`, `hull` and `mesh`, and how it sits there.
+/// A shape on a body: exactly one geometry (`sphere`, `capsule`, …, `mesh`), and how it sits there.
 #[derive(Debug, Default, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
@@ -233,8 +233,26 @@ pub(crate) struct ShapeSpec {
     pub cuboid: Option<CuboidSpec>,
     /// The convex hull of some points.
     pub hull: Option<HullSpec>,
-    /// Name of a mesh in `meshes`; for static and kinematic bodies.
+    /// A cylinder along the y axis.
+    pub cylinder: Option<CylinderSpec>,
+    /// A cone along the y axis, its tip up.
+    pub cone: Option<CylinderSpec>,
+    /// The convex hull of two balls on the y axis.
+    pub tapered_capsule: Option<TaperedCapsuleSpec>,
+    /// An ellipsoid about the origin.
+    pub ellipsoid: Option<EllipsoidSpec>,
+    /// Everything below the origin; for static and kinematic bodies. Written as `{}`.
+    pub half_space: Option<HalfSpaceSpec>,
+    /// A single triangle, solid on both sides.
+    pub triangle: Option<TriangleSpec>,
+    /// The shrink-wrap of points, which may be flat.
+    pub point_cloud: Option<HullSpec>,
+    /// Name of a mesh in `meshes`.
     pub mesh: Option<String>,
+    /// Grows a convex geometry by a radius on all sides, metres. Default: not.
+    pub rounding: Option<Number>,
+    /// Multiplies the geometry along its axes, before `rounding`; negative numbers mirror. Default [1, 1, 1].
+    pub scale: Option<Triple>,
     /// Where the shape's frame sits on the body, metres. Default [0, 0, 0].
     pub position: Option<Triple>,
     /// Unit quaternion [x, y, z, w]. Default [0, 0, 0, 1]. Either this or `turn`.
@@ -297,6 +315,54 @@ pub(crate) struct CuboidSpec {
 pub(crate) struct HullSpec {
     /// At least four points that are not flat, metres; at most 255 of them on the hull.
     pub points: Vec<Triple>,
+}
+
+/// A cylinder or a cone.
+#[derive(Debug, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub(crate) struct CylinderSpec {
+    /// From the middle to each end, metres.
+    pub half_length: Number,
+    /// Of the cylinder, or of the cone's base, metres.
+    pub radius: Number,
+}
+
+/// Two balls and all that is between them.
+#[derive(Debug, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub(crate) struct TaperedCapsuleSpec {
+    /// From the middle to the centre of each ball, metres.
+    pub half_length: Number,
+    /// Of the upper ball, metres.
+    pub top_radius: Number,
+    /// Of the lower ball, metres.
+    pub bottom_radius: Number,
+}
+
+/// An ellipsoid.
+#[derive(Debug, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub(crate) struct EllipsoidSpec {
+    /// Half the size along each axis, metres.
+    pub half_axes: Triple,
+}
+
+/// An endless floor; it has no numbers.
+#[derive(Debug, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub(crate) struct HalfSpaceSpec {}
+
+/// A triangle.
+#[derive(Debug, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub(crate) struct TriangleSpec {
+    /// Its corners, metres.
+    pub corners: [Triple; 3],
 }
 
 /// How two numbers make one.

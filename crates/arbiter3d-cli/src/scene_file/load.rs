@@ -1,7 +1,8 @@
 //! Fills a world from a scene file.
 
 use super::format::{
-    AxisSpec, BodySpec, CombineSpec, GridSpec, KindSpec, Number, SceneFile, ShapeSpec, Triple, Turn, WorldSpec,
+    AxisSpec, BodySpec, CombineSpec, GridSpec, HullSpec, KindSpec, Number, SceneFile, ShapeSpec, Triple, Turn,
+    WorldSpec,
 };
 use super::{obj, parse};
 use crate::problem::{Place, Problem};
@@ -254,25 +255,42 @@ fn shape_definition(spec: &ShapeSpec, meshes: &Meshes, path: &str) -> Result<Sha
     })
 }
 
-/// The one geometry that a shape is given.
+/// The one geometry that a shape is given, scaled and rounded.
 fn geometry(spec: &ShapeSpec, meshes: &Meshes, path: &str) -> Result<Shape, Complaint> {
+    let mut shape = plain_geometry(spec, meshes, path)?;
+    let complain = |name: &str, error: arbiter3d::ShapeError| (format!("{path}.{name}"), error.to_string());
+    if let Some(scale) = spec.scale {
+        shape = shape.scaled(vector(scale)).map_err(|error| complain("scale", error))?;
+    }
+    if let Some(Number(radius)) = spec.rounding {
+        shape = Shape::rounded(&shape, radius).map_err(|error| complain("rounding", error))?;
+    }
+    Ok(shape)
+}
+
+/// The one geometry that a shape is given, as it is.
+fn plain_geometry(spec: &ShapeSpec, meshes: &Meshes, path: &str) -> Result<Shape, Complaint> {
     let mut found: Vec<(&str, Result<Shape, String>)> = Vec::new();
-    let mut add = |name, shape: Result<Shape, arbiter3d::ShapeError>| {
-        found.push((name, shape.map_err(|error| error.to_string())));
+    let mut add = |name, shape: Option<Result<Shape, arbiter3d::ShapeError>>| {
+        found.extend(shape.map(|shape| (name, shape.map_err(|error| error.to_string()))));
     };
-    if let Some(sphere) = &spec.sphere {
-        add("sphere", Shape::sphere(sphere.radius.0));
-    }
-    if let Some(capsule) = &spec.capsule {
-        add("capsule", Shape::capsule(capsule.half_length.0, capsule.radius.0));
-    }
-    if let Some(cuboid) = &spec.cuboid {
-        add("cuboid", Shape::cuboid(vector(cuboid.half_extents)));
-    }
-    if let Some(hull) = &spec.hull {
-        let points: Vec<Vec3> = hull.points.iter().copied().map(vector).collect();
-        add("hull", Shape::hull(&points));
-    }
+    let points = |hull: &HullSpec| hull.points.iter().copied().map(vector).collect::<Vec<Vec3>>();
+    add("sphere", spec.sphere.as_ref().map(|s| Shape::sphere(s.radius.0)));
+    add("capsule", spec.capsule.as_ref().map(|s| Shape::capsule(s.half_length.0, s.radius.0)));
+    add("cuboid", spec.cuboid.as_ref().map(|s| Shape::cuboid(vector(s.half_extents))));
+    add("hull", spec.hull.as_ref().map(|s| Shape::hull(&points(s))));
+    add("cylinder", spec.cylinder.as_ref().map(|s| Shape::cylinder(s.half_length.0, s.radius.0)));
+    add("cone", spec.cone.as_ref().map(|s| Shape::cone(s.half_length.0, s.radius.0)));
+    add(
+        "tapered_capsule",
+        spec.tapered_capsule
+            .as_ref()
+            .map(|s| Shape::tapered_capsule(s.half_length.0, s.top_radius.0, s.bottom_radius.0)),
+    );
+    add("ellipsoid", spec.ellipsoid.as_ref().map(|s| Shape::ellipsoid(vector(s.half_axes))));
+    add("half_space", spec.half_space.as_ref().map(|_| Ok(Shape::half_space())));
+    add("triangle", spec.triangle.as_ref().map(|s| Shape::triangle(s.corners.map(vector))));
+    add("point_cloud", spec.point_cloud.as_ref().map(|s| Shape::point_cloud(&points(s))));
     if let Some(name) = &spec.mesh {
         let known = || meshes.keys().map(|name| format!("{name:?}")).collect::<Vec<_>>().join(", ");
         let missing = || format!("there is no mesh {name:?} in \"meshes\", which has: {}", known());
@@ -284,8 +302,9 @@ fn geometry(spec: &ShapeSpec, meshes: &Meshes, path: &str) -> Result<Shape, Comp
             shape.map_err(|message| (format!("{path}.{name}"), message))
         }
         count => {
-            let message =
-                format!("a shape is exactly one of sphere, capsule, cuboid, hull and mesh, this one is {count}");
+            let message = format!(
+                "a shape has exactly one geometry (sphere, capsule, cuboid, hull, … or mesh), this one has {count}"
+            );
             Err((path.to_owned(), message))
         }
     }
