@@ -10,7 +10,7 @@
 
 use super::geometry::Geometry;
 use super::mesh_edges::{Adjacency, Surface, Surroundings};
-use super::mesh_tree::{LEAF, Leaves, MeshTree, Slabs};
+use super::mesh_tree::{Descent, LEAF, Leaves, MeshTree, Slabs};
 use super::{MassProperties, ShapeError};
 use crate::math::{Aabb, Real, Vec3, max3, min3};
 use crate::query::{self, ShapeHit};
@@ -189,24 +189,25 @@ impl TriangleMesh {
     #[must_use]
     pub fn cast_ray(&self, origin: Vec3, direction: Vec3, limit: Real) -> Option<MeshRayHit> {
         let ray = Ray::new(origin, direction)?;
-        let mut best: Option<(Real, usize, bool)> = None;
-        let mut reach = limit;
-        self.tree.cast(&Slabs::new(origin, direction), limit, |index| {
-            let id = self.surroundings[index].id;
-            if let Some((distance, back)) = ray.hit(&self.corners(index), self.sides)
-                && distance <= reach
-                && best.is_none_or(|(d, other, _)| (distance, id) < (d, self.surroundings[other].id))
-            {
-                reach = distance;
-                best = Some((distance, index, back));
-            }
-            reach
-        });
-        best.map(|(distance, index, back)| {
+        let slabs = Slabs::of_point(origin, direction);
+        let mut search = RaySearch { mesh: self, ray, slabs, best: None };
+        self.tree.descend(limit, &mut search);
+        search.best.map(|(distance, index, back)| {
             let normal = self.facet(index).normal();
             let normal = if back { -normal } else { normal };
             MeshRayHit { distance, normal, triangle: self.surroundings[index].id }
         })
+    }
+
+    /// Shows the triangles to a search that wants the nearest first.
+    pub(crate) fn descend(&self, limit: Real, search: &mut impl Descent) {
+        self.tree.descend(limit, search);
+    }
+
+    /// The user's number of a triangle.
+    #[inline(always)]
+    pub(crate) fn id(&self, index: usize) -> u32 {
+        self.surroundings[index].id
     }
 
     pub(crate) fn local_aabb(&self) -> Aabb {
@@ -417,6 +418,39 @@ impl Ray {
         // The sum is minus twice the area as seen along the axis, which the ray may run down.
         let back = (sum < 0.0) != (self.shear[2] < 0.0);
         (distance >= 0.0 && !(back && sides == MeshSides::One)).then_some((distance, back))
+    }
+}
+
+/// The first triangle along a ray.
+struct RaySearch<'a> {
+    mesh: &'a TriangleMesh,
+    ray: Ray,
+    slabs: Slabs,
+    /// Distance, internal number, whether hit from behind.
+    best: Option<(Real, usize, bool)>,
+}
+
+impl Descent for RaySearch<'_> {
+    #[inline(always)]
+    fn distances<W: Lanes<LEAF>>(&self, low: &LaneVec3<W>, high: &LaneVec3<W>, limit: Real) -> W {
+        self.slabs.enter(low, high, limit)
+    }
+
+    #[inline(always)]
+    fn leaf<W: Lanes<LEAF>>(&mut self, first: usize, count: usize, limit: Real) -> Real {
+        let mut limit = limit;
+        for index in first..first + count {
+            let Some((distance, back)) = self.ray.hit(&self.mesh.corners(index), self.mesh.sides) else { continue };
+            let first = match self.best {
+                Some((best, other, _)) => (distance, self.mesh.id(index)) < (best, self.mesh.id(other)),
+                None => true,
+            };
+            if distance <= limit && first {
+                limit = distance;
+                self.best = Some((distance, index, back));
+            }
+        }
+        limit
     }
 }
 

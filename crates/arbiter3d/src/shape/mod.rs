@@ -47,7 +47,7 @@ pub use mass::MassProperties;
 pub(crate) use mesh::Facet;
 pub use mesh::{MeshRayHit, MeshSides, TriangleMesh};
 pub(crate) use mesh_edges::Surroundings;
-pub(crate) use mesh_tree::{LEAF, Leaves};
+pub(crate) use mesh_tree::{Descent, LEAF, Leaves, Slabs, box_distances};
 pub use point_cloud::PointCloud;
 pub use rounded::Rounded;
 pub use sphere::Sphere;

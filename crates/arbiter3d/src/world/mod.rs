@@ -23,7 +23,7 @@ pub use bodies::{BodyMut, BodyRef};
 pub use definition::{BodyDefinition, BodyKind, CombineRule, Filter, LockedAxes, Material, ShapeDefinition};
 pub use events::{BeginEvent, BeginListener, ContactProvider, EndEvent, EndListener, SensorEvent, StepContext};
 pub use filters::{ContactFilter, PairFilter, ShapePair};
-pub use queries::{QueryFilter, RayHit};
+pub use queries::{BodyKinds, CastHit, PointHit, QueryFilter, RayHit, ShapeContacts, ShapePredicate};
 pub use settings::WorldSettings;
 pub use shapes::{ShapeMut, ShapeRef};
 pub use step::StepReport;
