@@ -49,8 +49,9 @@ pub use shape::{
 };
 pub use simd::{SimdLevel, UnknownSimdLevel};
 pub use world::{
-    BeginEvent, BeginListener, BodyDefinition, BodyId, BodyKind, BodyMut, BodyRef, CombineRule, ContactFilter,
-    ContactProvider, EndEvent, EndListener, Error, Filter, LockedAxes, Material, PairFilter, Phase, QueryFilter,
-    RayHit, SensorEvent, ShapeDefinition, ShapeId, ShapeMut, ShapePair, ShapeRef, StepContext, StepReport, Timings,
-    UNIT_TOLERANCE, World, WorldSettings,
+    Anisotropy, BeginEvent, BeginListener, BodyDefinition, BodyId, BodyKind, BodyMut, BodyRef, CombineRule,
+    ContactEvents, ContactFilter, ContactProvider, EndEvent, EndListener, Error, Filter, HitEvent, HitListener,
+    LockedAxes, Material, PairFilter, PersistEvent, Phase, PreSolveListener, QueryFilter, RayHit, SensorEvent,
+    ShapeDefinition, ShapeId, ShapeMut, ShapePair, ShapeRef, StepContext, StepReport, Timings, UNIT_TOLERANCE, World,
+    WorldSettings,
 };
