@@ -50,8 +50,9 @@ pub use shape::{
 };
 pub use simd::{SimdLevel, UnknownSimdLevel};
 pub use world::{
-    BeginEvent, BeginListener, BodyDefinition, BodyId, BodyKind, BodyKinds, BodyMut, BodyRef, CastHit, CombineRule,
-    ContactFilter, ContactProvider, EndEvent, EndListener, Error, Filter, LockedAxes, Material, PairFilter, Phase,
-    PointHit, QueryFilter, RayHit, SensorEvent, ShapeContacts, ShapeDefinition, ShapeId, ShapeMut, ShapePair,
-    ShapePredicate, ShapeRef, StepContext, StepReport, Timings, UNIT_TOLERANCE, World, WorldSettings,
+    Anisotropy, BeginEvent, BeginListener, BodyDefinition, BodyId, BodyKind, BodyKinds, BodyMut, BodyRef, CastHit,
+    CombineRule, ContactEvents, ContactFilter, ContactProvider, EndEvent, EndListener, Error, Filter, HitEvent,
+    HitListener, LockedAxes, Material, PairFilter, PersistEvent, Phase, PointHit, PreSolveListener, QueryFilter,
+    RayHit, SensorEvent, ShapeContacts, ShapeDefinition, ShapeId, ShapeMut, ShapePair, ShapePredicate, ShapeRef,
+    StepContext, StepReport, Timings, UNIT_TOLERANCE, World, WorldSettings,
 };

@@ -92,6 +92,8 @@ pub(crate) struct WorldSpec {
     pub push_out_speed: Option<Number>,
     /// Approach speed below which nothing bounces, m/s. Default 1.
     pub restitution_threshold: Option<Number>,
+    /// Approach speed from which on a contact is a hit, m/s. Default 1.
+    pub hit_speed_threshold: Option<Number>,
     /// Speed limit of bodies, m/s. Default 1000.
     pub max_linear_speed: Option<Number>,
     /// Whether resting islands may fall asleep. Default true.
@@ -269,6 +271,8 @@ pub(crate) struct ShapeSpec {
     pub rolling_resistance: Option<Number>,
     /// Velocity of the surface in the body's frame, m/s: a conveyor belt. Default [0, 0, 0].
     pub tangent_velocity: Option<Triple>,
+    /// Friction that differs along a direction: skis, tracks. Default none.
+    pub anisotropy: Option<AnisotropySpec>,
     /// How the frictions of two shapes make one. Default "maximum".
     pub friction_combine: Option<CombineSpec>,
     /// How the restitutions of two shapes make one. Default "maximum".
@@ -277,6 +281,19 @@ pub(crate) struct ShapeSpec {
     pub filter: Option<FilterSpec>,
     /// Whether it only reports what overlaps it and pushes nothing. Default false.
     pub sensor: bool,
+    /// The way in which bodies pass through it, a unit vector in its frame. Default none: nothing passes.
+    pub one_way: Option<Triple>,
+}
+
+/// Friction that differs along a direction.
+#[derive(Debug, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub(crate) struct AnisotropySpec {
+    /// Unit vector in the shape's frame.
+    pub direction: Triple,
+    /// Friction along it as a share of that across, 0.001 to 1000.
+    pub ratio: Number,
 }
 
 /// A ball.

@@ -7,7 +7,8 @@ use super::format::{
 use super::{obj, parse};
 use crate::problem::{Place, Problem};
 use arbiter3d::{
-    BodyDefinition, BodyKind, CombineRule, Filter, LockedAxes, Material, Shape, ShapeDefinition, World, WorldSettings,
+    Anisotropy, BodyDefinition, BodyKind, CombineRule, Filter, LockedAxes, Material, Shape, ShapeDefinition, World,
+    WorldSettings,
     math::{Quat, Real, Vec3},
 };
 use arbiter3d_scenes::{BuiltScene, Random, SceneOptions, turns};
@@ -82,6 +83,7 @@ fn world(spec: &WorldSpec, options: &SceneOptions) -> Result<World, Complaint> {
         contact_damping_ratio: number(spec.contact_damping_ratio, default.contact_damping_ratio),
         push_out_speed: number(spec.push_out_speed, default.push_out_speed),
         restitution_threshold: number(spec.restitution_threshold, default.restitution_threshold),
+        hit_speed_threshold: number(spec.hit_speed_threshold, default.hit_speed_threshold),
         max_linear_speed: number(spec.max_linear_speed, default.max_linear_speed),
         allow_sleep: spec.allow_sleep.unwrap_or(default.allow_sleep),
         time_to_sleep: number(spec.time_to_sleep, default.time_to_sleep),
@@ -246,11 +248,13 @@ fn shape_definition(spec: &ShapeSpec, meshes: &Meshes, path: &str) -> Result<Sha
             restitution: number(spec.restitution, default.restitution),
             rolling_resistance: number(spec.rolling_resistance, default.rolling_resistance),
             tangent_velocity: spec.tangent_velocity.map_or(default.tangent_velocity, vector),
+            anisotropy: spec.anisotropy.as_ref().map(|it| Anisotropy::new(vector(it.direction), it.ratio.0)),
             friction_combine: combine_rule(spec.friction_combine, default.friction_combine),
             restitution_combine: combine_rule(spec.restitution_combine, default.restitution_combine),
         },
         filter,
         sensor: spec.sensor,
+        one_way: spec.one_way.map(vector),
         ..ShapeDefinition::new(geometry(spec, meshes, path)?)
     })
 }
@@ -417,6 +421,21 @@ mod tests {
     }
 
     #[test]
+    fn surfaces_are_given_to_their_shapes() {
+        let world = built(
+            r#"{"world": {"hit_speed_threshold": 2.5}, "bodies": [{"shapes": [{"sphere": {"radius": 1},
+                "one_way": [0, 1, 0], "tangent_velocity": [2, 0, 0],
+                "anisotropy": {"direction": [0, 0, 1], "ratio": 0.25}}]}]}"#,
+        )
+        .unwrap();
+        assert_eq!(world.settings().hit_speed_threshold, 2.5);
+        let body = world.bodies().nth(1).unwrap();
+        let shape = world.shape(world.body(body).unwrap().shapes()[0]).unwrap();
+        assert_eq!((shape.one_way(), shape.material().tangent_velocity), (Some(Vec3::Y), Vec3::X * 2.0));
+        assert_eq!(shape.material().anisotropy, Some(Anisotropy::new(Vec3::Z, 0.25)));
+    }
+
+    #[test]
     fn what_the_engine_refuses_is_named_by_its_path() {
         let ball = r#""shapes": [{"sphere": {"radius": 1}}]"#;
         let cases = [
@@ -435,6 +454,17 @@ mod tests {
                 r#"{"bodies": [{"shapes": [{"sphere": {"radius": 1}, "restitution": 2}]}]}"#.to_owned(),
                 "bodies[0].shapes[0]",
                 "restitution is 2",
+            ),
+            (
+                r#"{"bodies": [{"shapes": [{"sphere": {"radius": 1}, "one_way": [0, 2, 0]}]}]}"#.to_owned(),
+                "bodies[0].shapes[0]",
+                "one_way",
+            ),
+            (
+                r#"{"bodies": [{"shapes": [{"sphere": {"radius": 1}, "anisotropy": {"direction": [1, 0, 0], "ratio": 0}}]}]}"#
+                    .to_owned(),
+                "bodies[0].shapes[0]",
+                "anisotropy ratio is 0",
             ),
             (r#"{"world": {"substeps": 0}}"#.to_owned(), "world", "substeps is 0"),
             (r#"{"hz": 0}"#.to_owned(), "hz", "0 steps a second"),
