@@ -250,18 +250,32 @@ fn keep_overlapping<W: Number>(found: W, [low, high]: [W; 2], [wanted_low, wante
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Slabs {
     origin: Vec3,
-    inverse: [Real; 3],
     half: Vec3,
+    axes: [Slab; 3],
 }
 
-impl Slabs {
+/// An axis of a direction: its inverse for near planes and for far ones. Both are zero where the direction is.
+#[derive(Clone, Copy, Debug)]
+struct Slab {
+    near: Real,
+    far: Real,
+}
+
+impl Slab {
     /// More than `1 + 3 · 2⁻²⁴`, twice over.
     const GROW: Real = 1.0 + 1e-6;
 
+    fn new(direction: Real) -> Self {
+        let inverse = if direction == 0.0 { 0.0 } else { 1.0 / direction };
+        Self { near: inverse / Self::GROW, far: inverse * Self::GROW }
+    }
+}
+
+impl Slabs {
     /// A point that moves from `origin` along `direction`.
     pub(crate) fn of_point(origin: Vec3, direction: Vec3) -> Self {
-        let inverse = |d: Real| if d == 0.0 { 0.0 } else { 1.0 / d };
-        Self { origin, inverse: direction.to_array().map(inverse), half: Vec3::ZERO }
+        let axes = [Slab::new(direction.x), Slab::new(direction.y), Slab::new(direction.z)];
+        Self { origin, half: Vec3::ZERO, axes }
     }
 
     /// A box with these half extents, for a tree with this box around it.
@@ -284,15 +298,15 @@ impl Slabs {
             } else {
                 (low[axis] - W::splat(half) - W::splat(origin), high[axis] + W::splat(half) - W::splat(origin))
             };
-            let inverse = self.inverse[axis];
-            if inverse == 0.0 {
+            let inverse = self.axes[axis];
+            if inverse.far == 0.0 {
                 enter = a.if_positive(none, enter);
                 enter = b.if_at_least(W::ZERO, enter, none);
                 continue;
             }
-            let (near, far) = if inverse > 0.0 { (a, b) } else { (b, a) };
-            enter = (near * W::splat(inverse / Self::GROW)).max(enter);
-            leave = (far * W::splat(inverse * Self::GROW)).min(leave);
+            let (near, far) = if inverse.far > 0.0 { (a, b) } else { (b, a) };
+            enter = (near * W::splat(inverse.near)).max(enter);
+            leave = (far * W::splat(inverse.far)).min(leave);
         }
         leave.if_at_least(enter, enter, none)
     }
