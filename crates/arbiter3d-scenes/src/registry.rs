@@ -275,6 +275,18 @@ pub static SCENES: &[Scene] = &[
         size: Size::FIXED,
         build: scenes::character::character_course,
     },
+    Scene {
+        name: "one_way_platforms",
+        description: "ten bodies are thrown up through one-way platforms and stand each on its floor; a lift passes and carries",
+        size: Size::new("columns", 10, 100_000),
+        build: scenes::surfaces::one_way_platforms,
+    },
+    Scene {
+        name: "conveyors",
+        description: "eight boxes go round on a ring of belts, and seven skids slide along themselves on a slope",
+        size: Size::FIXED,
+        build: scenes::surfaces::conveyors,
+    },
 ];
 
 #[cfg(test)]

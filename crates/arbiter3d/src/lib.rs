@@ -52,7 +52,8 @@ pub use character::{
 };
 pub use query::{Ray, ShapeCast, ShapeDistance, ShapeHit, cast_ray, distance, overlaps};
 pub use shape::{
-    Capsule, ConvexHull, Cuboid, HalfEdge, MassProperties, MeshRayHit, MeshSides, Plane, Shape, ShapeError, Sphere,
+    Capsule, Cone, ConvexHull, ConvexShape, Cuboid, Custom, Cylinder, HalfEdge, HalfSpace, MassProperties, MeshRayHit,
+    MeshSides, Plane, PointCloud, Rounded, Shape, ShapeError, Sphere, TaperedCapsule, Transformed, Triangle,
     TriangleMesh,
 };
 pub use simd::{SimdLevel, UnknownSimdLevel};
@@ -61,8 +62,9 @@ pub use vehicle::{
     WheelState,
 };
 pub use world::{
-    BeginEvent, BeginListener, BodyDefinition, BodyId, BodyKind, BodyKinds, BodyMut, BodyRef, CastHit, CombineRule,
-    ContactFilter, ContactProvider, EndEvent, EndListener, Error, Filter, LockedAxes, Material, PairFilter, Phase,
-    PointHit, QueryFilter, RayHit, SensorEvent, ShapeContacts, ShapeDefinition, ShapeId, ShapeMut, ShapePair,
-    ShapePredicate, ShapeRef, StepContext, StepReport, Timings, UNIT_TOLERANCE, World, WorldSettings,
+    Anisotropy, BeginEvent, BeginListener, BodyDefinition, BodyId, BodyKind, BodyKinds, BodyMut, BodyRef, CastHit,
+    CombineRule, ContactEvents, ContactFilter, ContactProvider, EndEvent, EndListener, Error, Filter, HitEvent,
+    HitListener, LockedAxes, Material, PairFilter, PersistEvent, Phase, PointHit, PreSolveListener, QueryFilter,
+    RayHit, SensorEvent, ShapeContacts, ShapeDefinition, ShapeId, ShapeMut, ShapePair, ShapePredicate, ShapeRef,
+    StepContext, StepReport, Timings, UNIT_TOLERANCE, World, WorldSettings,
 };

@@ -33,14 +33,6 @@ fn drop_in(world: &mut World, shape: Shape, density: f32, at: Vec3, rotation: Qu
     add(world, &BodyDefinition::dynamic().at(at).rotated(rotation), &ShapeDefinition::new(shape).density(density))
 }
 
-/// A cylinder of 64 sides along y.
-fn prism(half_length: f32, radius: f32) -> Shape {
-    let points: Vec<Vec3> = (0..128)
-        .map(|i| common::heading(360.0 / 64.0 * (i / 2) as f32) * radius + Vec3::Y * [half_length, -half_length][i % 2])
-        .collect();
-    Shape::hull(&points).unwrap()
-}
-
 /// Depth of the lowest point of a ball of radius 1 that floats: V(h) = π h² (3 − h) / 3 = 4/3 π ρ.
 fn ball_draught(density: f64) -> f32 {
     let (mut low, mut high) = (0.0_f64, 2.0_f64);
@@ -66,7 +58,7 @@ fn floating_bodies_have_their_draught() {
         let part = density / 1000.0;
         assert_relative(draught_of(sphere(1.0), density, 1.0), ball_draught(f64::from(part)), 0.01, "ball");
         assert_relative(draught_of(cuboid(2.0, 0.5, 2.0), density, 0.5), part, 0.01, "box");
-        assert_relative(draught_of(prism(0.5, 2.0), density, 0.5), part, 0.01, "cylinder");
+        assert_relative(draught_of(Shape::cylinder(0.5, 2.0).unwrap(), density, 0.5), part, 0.01, "cylinder");
     }
     // Half of a lying capsule is below the middle of its axis.
     let mut world = sleepless();
@@ -82,7 +74,7 @@ fn floating_bodies_have_their_draught() {
 #[test]
 fn what_weighs_as_much_as_water_hovers() {
     let mut world = sleepless();
-    let shapes = [sphere(0.5), cube(0.5), capsule(0.5, 0.3), prism(0.5, 0.4)];
+    let shapes = [sphere(0.5), cube(0.5), capsule(0.5, 0.3), Shape::cylinder(0.5, 0.4).unwrap()];
     let mut bodies = Vec::new();
     for (index, shape) in shapes.into_iter().enumerate() {
         let at = Vec3::new(3.0 * index as f32, -5.0, 0.0);

@@ -506,3 +506,38 @@ fn bad_numbers_are_refused() {
     hero.update(&mut world, Vec3::ZERO, DT).unwrap();
     assert!(velocity(&world, BodyId::WORLD) == Vec3::ZERO && !hero.is_on_ground());
 }
+
+/// Among 300 random boxes, ramps and balls, walking about and jumping: nothing is entered deeper than the skin, and it never
+/// stays caught for good.
+#[test]
+fn clutter_is_neither_entered_nor_a_trap() {
+    let mut random = common::Random(5);
+    let mut walk = Walk::on_floor(Vec3::ZERO);
+    for _ in 0..300 {
+        let at = Vec3::new(random.range(-15.0, 15.0), random.range(-0.3, 1.5), random.range(-15.0, 15.0));
+        if at.x.hypot(at.z) < 2.0 {
+            continue;
+        }
+        let (shape, rotation) = (random.shape(), random.rotation());
+        fixed(&mut walk.world, shape, at, rotation);
+    }
+    let mut covered = 0.0;
+    for round in 0..150 {
+        let wanted = common::heading(random.range(0.0, 360.0)) * random.range(1.0, 6.0);
+        if round % 3 == 0 {
+            let speed = walk.hero.jump_speed(1.0);
+            walk.hero.jump(speed).unwrap();
+        }
+        let start = walk.at();
+        for _ in 0..60 {
+            let home = -walk.at() * 0.02;
+            let before = walk.at();
+            walk.step(wanted + home);
+            let moved = (walk.at() - before).length();
+            assert!(moved < 0.45 + 10.0 * DT, "round {round}: leaps by {moved} m to {}", walk.at());
+        }
+        covered += (walk.at() - start).length();
+        assert!(walk.deepest < SKIN, "round {round}: {} m deep at {}", walk.deepest, walk.at());
+    }
+    assert!(covered > 150.0, "only {covered} m");
+}

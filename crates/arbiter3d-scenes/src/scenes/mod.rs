@@ -8,6 +8,7 @@ pub(crate) mod fields;
 pub(crate) mod fluids;
 pub(crate) mod piles;
 pub(crate) mod stacks;
+pub(crate) mod surfaces;
 pub(crate) mod trees;
 pub(crate) mod vehicles;
 

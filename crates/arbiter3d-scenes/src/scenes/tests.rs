@@ -40,6 +40,8 @@ fn scenes_have_their_published_counts() {
         ("vehicle_track", None, 9),
         ("buoyancy_pool", None, 64),
         ("character_course", None, 1),
+        ("one_way_platforms", None, 11),
+        ("conveyors", None, 15),
     ];
     for (name, size, count) in counts {
         assert_eq!(dynamic(&built(name, size).world).len(), count, "{name}");

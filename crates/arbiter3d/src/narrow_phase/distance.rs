@@ -12,8 +12,8 @@
 //! witness points come from the weights of the simplex. Only the cores are compared: where they overlap, [`closest`]
 //! gives `None` and the caller turns to the separating axes.
 
-use crate::math::{Aabb, Pose, Real, Vec3};
-use crate::shape::{Capsule, ConvexHull, Cuboid, Shape, Sphere};
+use super::support::Support;
+use crate::math::{Pose, Real, Vec3};
 use glam::{DMat3, DVec3};
 
 mod linear_cast;
@@ -30,105 +30,6 @@ const GAIN: f64 = 1e-12;
 /// Polyhedra of 255 corners need less than 20 rounds; the cap is for rounding that goes in circles.
 const MAX_ROUNDS: usize = 64;
 
-/// A convex shape as a core with a radius.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Support<'a> {
-    Sphere(Sphere),
-    Capsule(Capsule),
-    Cuboid(Cuboid),
-    Hull(&'a ConvexHull),
-    Triangle([Vec3; 3]),
-}
-
-impl<'a> Support<'a> {
-    /// The support map of a shape; `None` for a mesh, which is not convex.
-    pub(crate) fn new(shape: &'a Shape) -> Option<Self> {
-        Some(match shape {
-            Shape::Sphere(s) => Self::Sphere(*s),
-            Shape::Capsule(s) => Self::Capsule(*s),
-            Shape::Cuboid(s) => Self::Cuboid(*s),
-            Shape::Hull(s) => Self::Hull(s),
-            Shape::Mesh(_) => return None,
-        })
-    }
-
-    /// How far the surface is from the core, metres.
-    #[inline]
-    pub(crate) fn radius(&self) -> Real {
-        match self {
-            Self::Sphere(s) => s.radius(),
-            Self::Capsule(s) => s.radius(),
-            _ => 0.0,
-        }
-    }
-
-    /// A point of the core that is furthest along `direction`.
-    #[inline]
-    fn core_support(&self, direction: DVec3) -> DVec3 {
-        let sign = |d: f64, h: Real| if d < 0.0 { -f64::from(h) } else { f64::from(h) };
-        match self {
-            Self::Sphere(_) => DVec3::ZERO,
-            Self::Capsule(s) => DVec3::new(0.0, sign(direction.y, s.half_length()), 0.0),
-            Self::Cuboid(s) => {
-                let h = s.half_extents();
-                DVec3::new(sign(direction.x, h.x), sign(direction.y, h.y), sign(direction.z, h.z))
-            }
-            Self::Hull(s) => furthest(s.vertices(), direction),
-            Self::Triangle(corners) => furthest(corners, direction),
-        }
-    }
-
-    /// The box around the shape placed by `pose`.
-    pub(crate) fn bounds(&self, pose: &Pose) -> Aabb {
-        match self {
-            Self::Sphere(s) => Aabb::from_center(pose.position, Vec3::splat(s.radius())),
-            Self::Capsule(s) => s.aabb(pose),
-            Self::Cuboid(s) => s.aabb(pose),
-            Self::Hull(s) => s.local_aabb().transform(pose),
-            Self::Triangle(corners) => Aabb::from_points(corners.map(|corner| pose.transform_point(corner))),
-        }
-    }
-
-    /// How far the shape reaches along a unit vector of its frame, metres.
-    pub(crate) fn extent(&self, direction: Vec3) -> Real {
-        let longest = |points: &[Vec3]| points.iter().fold(-Real::MAX, |m, p| crate::math::max(p.dot(direction), m));
-        match self {
-            Self::Sphere(s) => s.radius(),
-            Self::Capsule(s) => s.half_length() * direction.y.abs() + s.radius(),
-            Self::Cuboid(s) => s.half_extents().dot(crate::math::abs3(direction)),
-            Self::Hull(s) => longest(s.vertices()),
-            Self::Triangle(corners) => longest(corners),
-        }
-    }
-
-    /// Largest distance of a point of the shape from `pivot`, a point in its frame, metres.
-    pub(crate) fn reach(&self, pivot: Vec3) -> Real {
-        let squared = |p: &Vec3| (*p - pivot).length_squared();
-        let longest = |points: &[Vec3]| points.iter().fold(0.0, |m, p| crate::math::max(squared(p), m)).sqrt();
-        let around_origin = match self {
-            Self::Sphere(s) => s.radius(),
-            Self::Capsule(s) => s.half_length() + s.radius(),
-            Self::Cuboid(s) => s.half_extents().length(),
-            Self::Hull(s) => return longest(s.vertices()),
-            Self::Triangle(corners) => return longest(corners),
-        };
-        around_origin + pivot.length()
-    }
-}
-
-/// The first of the points that are furthest along `direction`.
-fn furthest(points: &[Vec3], direction: DVec3) -> DVec3 {
-    let (mut best, mut most) = (DVec3::ZERO, f64::MIN);
-    for point in points {
-        let point = point.as_dvec3();
-        let along = point.dot(direction);
-        if along > most {
-            (best, most) = (point, along);
-        }
-    }
-    best
-}
-
 /// The closest points of two cores that are apart, in the frame of shape 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Closest {
@@ -144,9 +45,9 @@ pub(crate) struct Closest {
 
 /// An extreme point of the difference `x2 − x1`, and where on shape 1 it comes from.
 #[derive(Clone, Copy, Default)]
-struct Corner {
-    difference: DVec3,
-    point1: DVec3,
+pub(super) struct Corner {
+    pub(super) difference: DVec3,
+    pub(super) point1: DVec3,
 }
 
 /// Up to four corners and the weights that make the point closest to the origin.
@@ -165,6 +66,7 @@ pub(crate) fn closest(shape1: &Support, shape2: &Support, pose: &Pose) -> Option
     if v.length_squared() == 0.0 {
         v = DVec3::X;
     }
+    let mut point1 = DVec3::ZERO;
     let mut size = 0.0;
     let mut shortest = f64::MAX;
     for _ in 0..MAX_ROUNDS {
@@ -178,20 +80,22 @@ pub(crate) fn closest(shape1: &Support, shape2: &Support, pose: &Pose) -> Option
         }
         simplex.push(corner);
         if !simplex.reduce() {
+            if v.dot(w) > 0.0 {
+                break; // All corners are on one side of the origin: a tetrahedron that holds it is flat, and rounding.
+            }
             return None;
         }
-        v = simplex.point();
-        let squared = v.length_squared();
+        let nearer = simplex.point();
+        let squared = nearer.length_squared();
         if squared <= TOUCHING * TOUCHING * size {
             return None;
         }
         if squared >= shortest {
-            break; // Rounding: no closer any more.
+            break; // Rounding: no closer any more. A simplex of corners that almost coincide can even be farther.
         }
-        shortest = squared;
+        (v, point1, shortest) = (nearer, simplex.witness(), squared);
     }
     let distance = v.length();
-    let point1 = simplex.witness();
     Some(Closest {
         point1: point1.as_vec3(),
         point2: (point1 + v).as_vec3(),
@@ -210,7 +114,7 @@ fn larger(a: f64, b: f64) -> f64 {
 }
 
 /// Two shapes and the placement of the second one.
-struct Placed<'a> {
+pub(super) struct Placed<'a> {
     shape1: &'a Support<'a>,
     shape2: &'a Support<'a>,
     rotation: DMat3,
@@ -218,14 +122,14 @@ struct Placed<'a> {
 }
 
 impl<'a> Placed<'a> {
-    fn new(shape1: &'a Support<'a>, shape2: &'a Support<'a>, pose: &Pose) -> Self {
+    pub(super) fn new(shape1: &'a Support<'a>, shape2: &'a Support<'a>, pose: &Pose) -> Self {
         let m = pose.rotation.to_mat3();
         let rotation = DMat3::from_cols(m.x_axis.as_dvec3(), m.y_axis.as_dvec3(), m.z_axis.as_dvec3());
         Self { shape1, shape2, rotation, position: pose.position.as_dvec3() }
     }
 
     /// The extreme point of the difference along `direction`.
-    fn corner(&self, direction: DVec3) -> Corner {
+    pub(super) fn corner(&self, direction: DVec3) -> Corner {
         let point1 = self.shape1.core_support(-direction);
         let m = &self.rotation;
         let local = DVec3::new(m.x_axis.dot(direction), m.y_axis.dot(direction), m.z_axis.dot(direction));
@@ -349,6 +253,7 @@ mod tests {
     use super::*;
     use crate::math::Rotation;
     use crate::narrow_phase::tests::Random;
+    use crate::shape::{Capsule, Cuboid, Sphere};
 
     fn gap(a: &Support, b: &Support, pose: &Pose) -> Option<Closest> {
         let found = closest(a, b, pose);

@@ -37,7 +37,7 @@ pub(crate) fn collide(mesh: &TriangleMesh, convex: &Shape, pose: &Pose, margin: 
             contact.gather(&mut Faceted::new(CuboidFeatures::new(cuboid).view()), pose.rotation.to_mat3());
         }
         Shape::Hull(hull) => contact.gather(&mut Faceted::new(Polyhedron::from_hull(hull)), pose.rotation.to_mat3()),
-        Shape::Mesh(_) => {}
+        _ => {}
     }
 }
 

@@ -348,7 +348,7 @@ fn inside(shape: &Shape, p: Vec3) -> Real {
         Shape::Capsule(c) => (p - Vec3::Y * p.y.clamp(-c.half_length(), c.half_length())).length() - c.radius(),
         Shape::Cuboid(c) => (p.abs() - c.half_extents()).max_element(),
         Shape::Hull(h) => h.planes().iter().map(|f| f.normal.dot(p) - f.offset).fold(-Real::MAX, Real::max),
-        Shape::Mesh(_) => Real::MAX,
+        _ => Real::MAX,
     }
 }
 
@@ -480,7 +480,7 @@ fn a_rounded_slope_has_no_bumps() {
                 Shape::Capsule(c) => c.radius() + down.y.abs() * c.half_length(),
                 Shape::Cuboid(c) => down.abs().dot(c.half_extents()),
                 Shape::Hull(h) => down.dot(h.support(down).1),
-                Shape::Mesh(_) => 0.0,
+                _ => 0.0,
             };
             let (x, z) = (8.0 * random.next(), 8.0 * random.next());
             let pose = Pose::new(Vec3::new(x, x * slope, z) + far + normal * (below - 0.005), turn);

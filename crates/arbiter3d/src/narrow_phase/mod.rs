@@ -17,19 +17,24 @@ mod capsule;
 mod clip;
 mod cuboid;
 mod distance;
+mod general;
+mod half_space;
 mod hull;
 mod manifold;
 mod mesh;
 mod mesh_points;
+mod penetration;
 mod polyhedron;
 mod sphere;
+mod support;
 mod time_of_impact;
 mod triangle;
 mod triangle_lanes;
 mod triangle_solid;
 
 pub(crate) use cuboid::{CuboidLanes, CuboidPair, Near as NearCuboids, WideManifold};
-pub(crate) use distance::{Cast, CastPoint, Support, closest, linear_cast};
+pub(crate) use distance::{Cast, CastPoint, closest, linear_cast};
+pub(crate) use support::Support;
 pub(crate) use time_of_impact::{Sweep, gap, time_of_impact};
 
 pub use manifold::{Manifold, ManifoldPoint};
@@ -103,7 +108,9 @@ fn rank(shape: &Shape) -> u8 {
         Shape::Capsule(_) => 1,
         Shape::Cuboid(_) => 2,
         Shape::Hull(_) => 3,
-        Shape::Mesh(_) => 4,
+        Shape::HalfSpace(_) => 6,
+        Shape::Mesh(_) => 5,
+        _ => 4,
     }
 }
 
@@ -126,9 +133,9 @@ fn collide_sorted(
         (Shape::Hull(a), Shape::Capsule(b)) => capsule::hull_capsule(a, b, pose, margin, manifold),
         (Shape::Hull(a), Shape::Cuboid(b)) => hull::collide(level, (a, b), pose, margin, (cache, manifold)),
         (Shape::Hull(a), Shape::Hull(b)) => hull::collide(level, (a, &**b), pose, margin, (cache, manifold)),
-        (Shape::Mesh(_), Shape::Mesh(_)) => manifold.clear(),
-        (Shape::Mesh(a), convex) => mesh::collide(a, convex, pose, margin, manifold),
-        _ => manifold.clear(),
+        (Shape::Mesh(a), convex) if convex.is_convex() => mesh::collide(a, convex, pose, margin, manifold),
+        (Shape::HalfSpace(_), other) => half_space::collide(other, pose, margin, manifold),
+        _ => general::collide((shape1, shape2), pose, margin, manifold),
     }
 }
 

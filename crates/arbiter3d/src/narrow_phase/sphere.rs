@@ -5,8 +5,9 @@
 //! solid, the nearest face gives normal and depth; where `c = q` any direction square to the core is as good as
 //! another.
 
-use super::distance::{Support, closest};
+use super::distance::closest;
 use super::polyhedron::Polyhedron;
+use super::support::Support;
 use super::{Manifold, ManifoldPoint};
 use crate::math::{Pose, Real, Vec3, clamp, normalize_or, tangents};
 use crate::shape::{Capsule, ConvexHull, Cuboid, Sphere};

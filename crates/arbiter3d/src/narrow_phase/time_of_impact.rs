@@ -15,7 +15,8 @@
 //!
 //! Positions are subtracted in `f64` before they are rounded, so sweeps far from the origin lose nothing more.
 
-use super::distance::{Support, closest};
+use super::distance::closest;
+use super::support::Support;
 use crate::math::{Pose, Real, Vec3, max, min};
 use glam::DVec3;
 

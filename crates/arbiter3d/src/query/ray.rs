@@ -13,7 +13,7 @@
 //!   clipping", 1978.
 //! - *Everything else:* GJK on the parts of the shape.
 
-use super::parts::{Region, visit_parts};
+use super::parts::{Path, Region, Solid, visit_parts};
 use crate::math::{Pose, Real, Vec3};
 use crate::narrow_phase::{Cast, Support, linear_cast};
 use crate::shape::{Capsule, Cuboid, Plane, Shape};
@@ -68,7 +68,7 @@ pub struct ShapeHit {
 }
 
 impl ShapeHit {
-    const INSIDE: Self = Self { fraction: 0.0, normal: Vec3::ZERO };
+    pub(crate) const INSIDE: Self = Self { fraction: 0.0, normal: Vec3::ZERO };
 }
 
 /// The first point of a shape along a ray given in the shape's frame.
@@ -100,7 +100,7 @@ pub(crate) fn find(shape: &Shape, ray: &Ray) -> Option<PartHit> {
             let hit = ShapeHit { fraction: found.distance, normal: found.normal };
             return Some(PartHit { hit, child: None, triangle: Some(found.triangle) });
         }
-        #[allow(unreachable_patterns, reason = "kinds without a kernel of their own")]
+        other if other.is_convex() || matches!(other, Shape::HalfSpace(_)) => other.geometry().cast_ray(ray),
         other => return cast_parts(other, ray),
     };
     hit.map(|hit| PartHit { hit, child: None, triangle: None })
@@ -116,8 +116,9 @@ pub(crate) fn cast_parts(shape: &Shape, ray: &Ray) -> Option<PartHit> {
     let start = Pose::from_position(ray.origin);
     let size = shape.local_aabb().half_extents().length();
     let mut best: Option<PartHit> = None;
-    let region =
-        Region::Path { center: ray.origin, half: Vec3::ZERO, displacement: ray.direction, limit: ray.max_fraction };
+    let (center, displacement, limit) = (ray.origin, ray.direction, ray.max_fraction);
+    let solid = Solid::point(center);
+    let region = Region::Path(Path { center, half: Vec3::ZERO, displacement, limit, solid });
     visit_parts(shape, &region, |part, limit| {
         let direction = part.vector_in(ray.direction);
         let hit = match linear_cast((&part.support, &probe), &part.seen(&start), direction, limit, size) {
@@ -138,12 +139,12 @@ pub(crate) fn cast_parts(shape: &Shape, ray: &Ray) -> Option<PartHit> {
 }
 
 /// A hit, if it lies on the ray.
-fn hit_at(fraction: Real, normal: Vec3, ray: &Ray) -> Option<ShapeHit> {
+pub(crate) fn hit_at(fraction: Real, normal: Vec3, ray: &Ray) -> Option<ShapeHit> {
     (fraction >= 0.0 && fraction <= ray.max_fraction).then_some(ShapeHit { fraction, normal })
 }
 
 /// Where a ray from outside enters the ball of a radius about the origin, and the point there.
-fn enter_ball(radius: Real, origin: Vec3, direction: Vec3) -> Option<(Real, Vec3)> {
+pub(crate) fn enter_ball(radius: Real, origin: Vec3, direction: Vec3) -> Option<(Real, Vec3)> {
     let length = direction.length();
     // A zero direction gives NaN here, which misses below.
     let unit = direction / length;
@@ -161,7 +162,7 @@ fn enter_ball(radius: Real, origin: Vec3, direction: Vec3) -> Option<(Real, Vec3
     Some((distance / length, closest - unit * half_chord))
 }
 
-fn cast_sphere(radius: Real, ray: &Ray) -> Option<ShapeHit> {
+pub(crate) fn cast_sphere(radius: Real, ray: &Ray) -> Option<ShapeHit> {
     if ray.origin.length_squared() < radius * radius {
         return Some(ShapeHit::INSIDE);
     }
@@ -171,7 +172,7 @@ fn cast_sphere(radius: Real, ray: &Ray) -> Option<ShapeHit> {
 
 /// The line first enters the infinite cylinder about y. Within the segment that is the hit. Past an end, everything that
 /// follows inside the cylinder reaches the capsule through the ball at that end, so the ball decides.
-fn cast_capsule(capsule: &Capsule, ray: &Ray) -> Option<ShapeHit> {
+pub(crate) fn cast_capsule(capsule: &Capsule, ray: &Ray) -> Option<ShapeHit> {
     let (radius, half_length) = (capsule.radius(), capsule.half_length());
     let (origin, direction) = (ray.origin, ray.direction);
     let on_axis = Vec3::new(0.0, crate::math::clamp(origin.y, -half_length, half_length), 0.0);
@@ -232,7 +233,7 @@ impl Clip {
     }
 }
 
-fn cast_cuboid(cuboid: &Cuboid, ray: &Ray) -> Option<ShapeHit> {
+pub(crate) fn cast_cuboid(cuboid: &Cuboid, ray: &Ray) -> Option<ShapeHit> {
     let half_extents = cuboid.half_extents();
     let mut clip = Clip::new(ray);
     for (axis, normal) in [Vec3::X, Vec3::Y, Vec3::Z].into_iter().enumerate() {
@@ -244,7 +245,7 @@ fn cast_cuboid(cuboid: &Cuboid, ray: &Ray) -> Option<ShapeHit> {
     clip.hit()
 }
 
-fn cast_planes(planes: &[Plane], ray: &Ray) -> Option<ShapeHit> {
+pub(crate) fn cast_planes(planes: &[Plane], ray: &Ray) -> Option<ShapeHit> {
     let mut clip = Clip::new(ray);
     for plane in planes {
         let height = plane.normal.dot(ray.origin) - plane.offset;

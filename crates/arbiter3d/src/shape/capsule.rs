@@ -1,7 +1,9 @@
 //! Capsules: a segment with a radius.
 
+use super::geometry::Geometry;
 use super::{MassProperties, ShapeError, positive};
 use crate::math::{Aabb, Pose, Real, Rotation, SymmetricMat3, Vec3, abs3};
+use crate::query::{Ray, ShapeHit, cast_capsule};
 
 /// A segment on the y axis from `-half_length` to `half_length`, grown by `radius`.
 ///
@@ -84,5 +86,35 @@ impl Capsule {
             center: Vec3::ZERO,
             inertia: SymmetricMat3::diagonal(Vec3::new(across, along, across)),
         }
+    }
+}
+
+impl Geometry for Capsule {
+    fn local_aabb(&self) -> Aabb {
+        self.local_aabb()
+    }
+
+    fn aabb(&self, pose: &Pose) -> Aabb {
+        self.aabb(pose)
+    }
+
+    fn mass_properties(&self, density: Real) -> Result<MassProperties, ShapeError> {
+        Ok(self.mass_properties(density))
+    }
+
+    fn inner_ball(&self) -> (Vec3, Real) {
+        (Vec3::ZERO, self.radius)
+    }
+
+    fn reach_from(&self, point: Vec3) -> Real {
+        Vec3::new(point.x, point.y.abs() + self.half_length, point.z).length() + self.radius
+    }
+
+    fn rounding_radius(&self) -> Real {
+        self.radius
+    }
+
+    fn cast_ray(&self, ray: &Ray) -> Option<ShapeHit> {
+        cast_capsule(self, ray)
     }
 }

@@ -1,7 +1,9 @@
 //! Boxes.
 
+use super::geometry::Geometry;
 use super::{MassProperties, ShapeError, positive};
-use crate::math::{Aabb, Pose, Real, SymmetricMat3, Vec3, rotated_half_extents};
+use crate::math::{Aabb, Pose, Real, SymmetricMat3, Vec3, abs3, rotated_half_extents};
+use crate::query::{Ray, ShapeHit, cast_cuboid};
 
 /// A box about the origin of its frame.
 ///
@@ -52,5 +54,31 @@ impl Cuboid {
             center: Vec3::ZERO,
             inertia: SymmetricMat3::diagonal(Vec3::new(s.y + s.z, s.x + s.z, s.x + s.y)),
         }
+    }
+}
+
+impl Geometry for Cuboid {
+    fn local_aabb(&self) -> Aabb {
+        self.local_aabb()
+    }
+
+    fn aabb(&self, pose: &Pose) -> Aabb {
+        self.aabb(pose)
+    }
+
+    fn mass_properties(&self, density: Real) -> Result<MassProperties, ShapeError> {
+        Ok(self.mass_properties(density))
+    }
+
+    fn inner_ball(&self) -> (Vec3, Real) {
+        (Vec3::ZERO, self.half_extents.min_element())
+    }
+
+    fn reach_from(&self, point: Vec3) -> Real {
+        (abs3(point) + self.half_extents).length()
+    }
+
+    fn cast_ray(&self, ray: &Ray) -> Option<ShapeHit> {
+        cast_cuboid(self, ray)
     }
 }

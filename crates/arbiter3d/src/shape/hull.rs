@@ -21,11 +21,13 @@
 //! have three corners or more, vertices three faces or more. Vertices keep the order of the input points; a face
 //! starts at its lowest vertex, and the faces are sorted: the same points give the same hull, bit for bit.
 
+use super::geometry::Geometry;
 use super::hull_builder::{Lattice, TriangulatedHull};
 use super::hull_features::{HullFeatures, LANES};
 use super::hull_merge::{Outline, simplify, triangles_as_outlines};
 use super::{MassProperties, ShapeError, positive};
-use crate::math::{Aabb, Pose, Real, SymmetricMat3, Vec3};
+use crate::math::{Aabb, Pose, Real, SymmetricMat3, Vec3, max};
+use crate::query::{Ray, ShapeHit, cast_planes};
 use glam::DVec3;
 use std::collections::BTreeMap;
 
@@ -287,6 +289,32 @@ impl ConvexHull {
             center: self.unit_mass.center,
             inertia: self.unit_mass.inertia.scale(density),
         }
+    }
+}
+
+impl Geometry for ConvexHull {
+    fn local_aabb(&self) -> Aabb {
+        self.local_aabb()
+    }
+
+    fn aabb(&self, pose: &Pose) -> Aabb {
+        self.aabb(pose)
+    }
+
+    fn mass_properties(&self, density: Real) -> Result<MassProperties, ShapeError> {
+        Ok(self.mass_properties(density))
+    }
+
+    fn inner_ball(&self) -> (Vec3, Real) {
+        (self.centroid(), self.inner_radius())
+    }
+
+    fn reach_from(&self, point: Vec3) -> Real {
+        self.vertices.iter().fold(0.0, |far, v| max((*v - point).length(), far))
+    }
+
+    fn cast_ray(&self, ray: &Ray) -> Option<ShapeHit> {
+        cast_planes(&self.planes, ray)
     }
 }
 

@@ -1,6 +1,7 @@
 //! Mass, centre of mass and inertia.
 
 use crate::math::{Pose, Real, SymmetricMat3, Vec3};
+use glam::{DMat3, DVec3};
 
 /// Mass (kg), centre of mass (m, in the frame the properties are given in) and inertia about that centre (kg m²).
 ///
@@ -42,6 +43,120 @@ impl MassProperties {
         let about = |m: &Self| m.inertia.add(&SymmetricMat3::steiner(m.mass, m.center - center));
         Self { mass, center, inertia: about(self).add(&about(other)) }
     }
+}
+
+impl MassProperties {
+    /// The same matter `factor` times as dense.
+    #[must_use]
+    pub(crate) fn scaled(&self, factor: Real) -> Self {
+        Self { mass: self.mass * factor, center: self.center, inertia: self.inertia.scale(factor) }
+    }
+}
+
+/// Second moments `∫ x xᵀ` of a solid with its volume and its first moments, in `f64`: they add up over parts, and an affine
+/// map turns them exactly.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Moments {
+    pub volume: f64,
+    pub first: DVec3,
+    pub second: DMat3,
+}
+
+impl Moments {
+    /// Of what has these mass properties at density one.
+    pub fn of(unit: &MassProperties) -> Self {
+        let (volume, center, i) = (f64::from(unit.mass), unit.center.as_dvec3(), &unit.inertia);
+        let column = |x: Real, y: Real, z: Real| DVec3::new(x.into(), y.into(), z.into());
+        let inertia = DMat3::from_cols(column(i.xx, i.xy, i.xz), column(i.xy, i.yy, i.yz), column(i.xz, i.yz, i.zz));
+        let half_trace = 0.5 * (inertia.x_axis.x + inertia.y_axis.y + inertia.z_axis.z);
+        let central = DMat3::from_diagonal(DVec3::splat(half_trace)) - inertia;
+        Self { volume, first: center * volume, second: central + outer(center, center) * volume }
+    }
+
+    /// Adds the tetrahedron from the origin to a triangle, counter-clockwise from outside.
+    pub fn add_triangle(&mut self, [a, b, c]: [DVec3; 3]) {
+        let volume = a.dot(b.cross(c)) / 6.0;
+        let sum = a + b + c;
+        self.volume += volume;
+        self.first += sum * (0.25 * volume);
+        let squares = outer(a, a) + outer(b, b) + outer(c, c) + outer(sum, sum);
+        self.second += squares * (volume / 20.0);
+    }
+
+    /// Of the solid after `x → linear x + translation`.
+    pub fn map(&self, linear: &DMat3, translation: DVec3) -> Self {
+        let scale = linear.determinant().abs();
+        let (volume, first) = (self.volume * scale, *linear * self.first * scale);
+        let cross = outer(first, translation);
+        let second = *linear * self.second * linear.transpose() * scale
+            + cross
+            + cross.transpose()
+            + outer(translation, translation) * volume;
+        Self { volume, first: first + translation * volume, second }
+    }
+
+    /// `a` times these and `b` times others.
+    pub fn blend(&self, a: f64, other: &Self, b: f64) -> Self {
+        Self {
+            volume: self.volume * a + other.volume * b,
+            first: self.first * a + other.first * b,
+            second: self.second * a + other.second * b,
+        }
+    }
+
+    /// Mass, centre and inertia at density one; `None` without a volume that `f32` can hold.
+    pub fn unit_mass(&self) -> Option<MassProperties> {
+        let center = self.first / self.volume;
+        let central = self.second - outer(center, center) * self.volume;
+        let trace = central.x_axis.x + central.y_axis.y + central.z_axis.z;
+        let inertia = SymmetricMat3 {
+            xx: (trace - central.x_axis.x) as Real,
+            yy: (trace - central.y_axis.y) as Real,
+            zz: (trace - central.z_axis.z) as Real,
+            xy: -central.x_axis.y as Real,
+            xz: -central.x_axis.z as Real,
+            yz: -central.y_axis.z as Real,
+        };
+        let unit = MassProperties { mass: self.volume as Real, center: center.as_vec3(), inertia };
+        let good = unit.mass > 0.0 && unit.mass.is_finite() && unit.center.is_finite() && inertia.is_finite();
+        good.then_some(unit)
+    }
+}
+
+/// `a bᵀ`.
+fn outer(a: DVec3, b: DVec3) -> DMat3 {
+    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
+}
+
+/// Nodes and weights of the five-point rule of Gauss and Legendre on `[−1, 1]`, exact for polynomials of degree nine.
+const GAUSS: [(f64, f64); 5] = [
+    (-0.906_179_845_938_664, 0.236_926_885_056_189_1),
+    (-0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
+    (0.0, 0.568_888_888_888_888_9),
+    (0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
+    (0.906_179_845_938_664, 0.236_926_885_056_189_1),
+];
+
+/// A stretch of the axis of a solid of revolution, and `ρ²` along it.
+pub(crate) type RevolvedPiece<'a> = (f64, f64, &'a dyn Fn(f64) -> f64);
+
+/// At density one, of a solid of revolution about y: `π ∫ρ² dy` and its moments, exact where `ρ²` is a square polynomial.
+pub(crate) fn mass_of_revolution(pieces: &[RevolvedPiece<'_>]) -> MassProperties {
+    let (mut volume, mut first, mut second, mut fourth) = (0.0, 0.0, 0.0, 0.0);
+    for &(low, high, squared) in pieces {
+        let half = 0.5 * (high - low);
+        for (node, weight) in GAUSS {
+            let y = 0.5 * (low + high) + half * node;
+            let area = std::f64::consts::PI * squared(y) * weight * half;
+            volume += area;
+            first += area * y;
+            second += area * y * y;
+            fourth += 0.25 * area * squared(y);
+        }
+    }
+    let moments =
+        Moments { volume, first: DVec3::Y * first, second: DMat3::from_diagonal(DVec3::new(fourth, second, fourth)) };
+    moments.unit_mass().unwrap_or_default()
 }
 
 #[cfg(test)]

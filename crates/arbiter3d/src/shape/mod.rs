@@ -1,10 +1,22 @@
-//! Collision geometry: spheres, capsules, cuboids, convex hulls and triangle meshes.
+//! Collision geometry.
 //!
 //! A [`Shape`] is geometry alone, in its own frame. Where it sits on a body and what it is made of (density, friction, …)
-//! is said when it is attached. Hulls and meshes are shared: cloning a `Shape` copies a reference.
+//! is said when it is attached. What takes memory is shared: cloning a `Shape` copies a reference, and 10,000 bodies with
+//! one hull hold one hull.
+//!
+//! Convex kinds with kernels of their own: spheres, capsules, cuboids, hulls. Convex kinds known to the kernels by their
+//! support function and their features (`convex`): cylinders, cones, tapered capsules, single triangles, point clouds,
+//! anything convex grown by a radius or after an affine map, and shapes of the user's own. Then endless half-spaces, and
+//! what is made of many parts: triangle meshes.
 
 mod capsule;
+mod cone;
+mod convex;
 mod cuboid;
+mod custom;
+mod cylinder;
+mod geometry;
+mod half_space;
 mod hull;
 mod hull_builder;
 mod hull_features;
@@ -14,10 +26,21 @@ mod mesh;
 mod mesh_edges;
 mod mesh_tree;
 mod mesh_tree_builder;
+mod point_cloud;
+mod rounded;
 mod sphere;
+mod tapered_capsule;
+mod transformed;
+mod triangle;
 
 pub use capsule::Capsule;
+pub use cone::Cone;
+pub(crate) use convex::{FEATURE_POINTS, FLAT_SINE, Feature};
 pub use cuboid::Cuboid;
+pub use custom::{ConvexShape, Custom};
+pub use cylinder::Cylinder;
+pub(crate) use geometry::Geometry;
+pub use half_space::HalfSpace;
 pub use hull::{ConvexHull, HalfEdge, Plane};
 pub(crate) use hull_features::{BorderEdge, CornerGroup, FaceGroup, LANES};
 pub use mass::MassProperties;
@@ -25,9 +48,16 @@ pub(crate) use mesh::Facet;
 pub use mesh::{MeshRayHit, MeshSides, TriangleMesh};
 pub(crate) use mesh_edges::Surroundings;
 pub(crate) use mesh_tree::{Descent, LEAF, Leaves, Slabs, box_distances};
+pub use point_cloud::PointCloud;
+pub use rounded::Rounded;
 pub use sphere::Sphere;
+pub use tapered_capsule::TaperedCapsule;
+pub use transformed::Transformed;
+pub use triangle::Triangle;
+pub(crate) use triangle::triangle_feature;
 
-use crate::math::{Aabb, Pose, Real, Vec3};
+use crate::math::{Aabb, Mat3, Pose, Real, Vec3};
+use crate::narrow_phase::Support;
 use std::sync::Arc;
 
 /// Why a shape cannot be built. Each message names the argument or the element.
@@ -99,6 +129,68 @@ pub enum ShapeError {
         /// Which triangle.
         triangle: usize,
     },
+    /// One ball of a tapered capsule holds the other.
+    #[error(
+        "balls of {top_radius} m and {bottom_radius} m are {distance} m apart, so one holds the other: use a sphere, or \
+         move them apart"
+    )]
+    BallInBall {
+        /// Distance of the centres, metres.
+        distance: Real,
+        /// Radius of the upper ball, metres.
+        top_radius: Real,
+        /// Radius of the lower ball, metres.
+        bottom_radius: Real,
+    },
+    /// A shape that has to be convex is not.
+    #[error("{what} must be convex and bounded: not a mesh, a half-space or another shape of many parts")]
+    NotConvex {
+        /// What it is for.
+        what: &'static str,
+    },
+    /// An affine map that is flat or not finite.
+    #[error("the determinant of the map is {determinant}: a shape after it would be flat or endless")]
+    FlatTransform {
+        /// The determinant of its linear part.
+        determinant: Real,
+    },
+    /// A shape without a volume has no mass.
+    #[error("{shape} has no volume, so no mass: {advice}")]
+    NoVolume {
+        /// Which shape.
+        shape: &'static str,
+        /// What to do.
+        advice: &'static str,
+    },
+    /// A mesh with holes has no inside, so no mass.
+    #[error("{edges} edges of the mesh have no matching neighbour: close the mesh, or put it on a static body")]
+    OpenMesh {
+        /// How many edges are open, or run the same way in two triangles.
+        edges: usize,
+    },
+    /// A point cloud without points.
+    #[error("the point cloud has no points")]
+    NoPoints,
+    /// The support function of a custom shape gives a point that cannot be one.
+    #[error(
+        "along {direction:?} the support function gives {point:?}: it must be finite and not behind the centre {center:?}"
+    )]
+    BadSupport {
+        /// The direction asked for.
+        direction: Vec3,
+        /// What the function gave.
+        point: Vec3,
+        /// What the shape gives as its centre.
+        center: Vec3,
+    },
+    /// The box of a custom shape is empty or not finite.
+    #[error("the box of the custom shape is from {min:?} to {max:?}: it must be finite, the lower corner first")]
+    BadBox {
+        /// Lower corner.
+        min: Vec3,
+        /// Upper corner.
+        max: Vec3,
+    },
 }
 
 /// Checks that a length can be used: finite and above zero.
@@ -128,6 +220,24 @@ pub enum Shape {
     Hull(Arc<ConvexHull>),
     /// A triangle mesh, for static and kinematic bodies.
     Mesh(Arc<TriangleMesh>),
+    /// A cylinder along y.
+    Cylinder(Cylinder),
+    /// A cone along y.
+    Cone(Cone),
+    /// The convex hull of two balls on y.
+    TaperedCapsule(TaperedCapsule),
+    /// All below the origin, for static and kinematic bodies.
+    HalfSpace(HalfSpace),
+    /// A single triangle, solid on both sides.
+    Triangle(Arc<Triangle>),
+    /// The shrink-wrap of points.
+    PointCloud(Arc<PointCloud>),
+    /// A convex shape grown by a radius.
+    Rounded(Arc<Rounded>),
+    /// A convex shape after an affine map.
+    Transformed(Arc<Transformed>),
+    /// A convex shape of the user's own.
+    Custom(Arc<Custom>),
 }
 
 impl Shape {
@@ -171,88 +281,240 @@ impl Shape {
         TriangleMesh::new(vertices, triangles).map(|mesh| Self::Mesh(Arc::new(mesh)))
     }
 
+    /// A cylinder along y, from `-half_length` to `half_length`; metres.
+    ///
+    /// # Errors
+    /// If a length is not finite and above zero.
+    pub fn cylinder(half_length: Real, radius: Real) -> Result<Self, ShapeError> {
+        Cylinder::new(half_length, radius).map(Self::Cylinder)
+    }
+
+    /// A cone along y: its tip at `half_length`, its base of `radius` at `-half_length`; metres.
+    ///
+    /// # Errors
+    /// If a length is not finite and above zero.
+    pub fn cone(half_length: Real, radius: Real) -> Result<Self, ShapeError> {
+        Cone::new(half_length, radius).map(Self::Cone)
+    }
+
+    /// The convex hull of a ball of `top_radius` at `half_length` on y and one of `bottom_radius` at `-half_length`; metres.
+    ///
+    /// # Errors
+    /// If a length is not finite and above zero, or one ball holds the other.
+    pub fn tapered_capsule(half_length: Real, top_radius: Real, bottom_radius: Real) -> Result<Self, ShapeError> {
+        TaperedCapsule::new(half_length, top_radius, bottom_radius).map(Self::TaperedCapsule)
+    }
+
+    /// All below the origin, an endless floor; for static and kinematic bodies.
+    #[must_use]
+    pub fn half_space() -> Self {
+        Self::HalfSpace(HalfSpace)
+    }
+
+    /// A single triangle, solid on both sides; metres.
+    ///
+    /// # Errors
+    /// If a corner is not finite, or the triangle has no area.
+    pub fn triangle(corners: [Vec3; 3]) -> Result<Self, ShapeError> {
+        Triangle::new(corners).map(|triangle| Self::Triangle(Arc::new(triangle)))
+    }
+
+    /// The shrink-wrap of points, metres; they may lie on a plane or a line.
+    ///
+    /// # Errors
+    /// If there is no point, or one is not finite.
+    pub fn point_cloud(points: &[Vec3]) -> Result<Self, ShapeError> {
+        PointCloud::new(points).map(|cloud| Self::PointCloud(Arc::new(cloud)))
+    }
+
+    /// A convex shape grown by `radius` (metres) on all sides: rounded boxes, hulls, cylinders.
+    ///
+    /// # Errors
+    /// If the radius is not a finite length above zero, or the core is not convex.
+    pub fn rounded(core: &Self, radius: Real) -> Result<Self, ShapeError> {
+        Rounded::new(core, radius).map(|rounded| Self::Rounded(Arc::new(rounded)))
+    }
+
+    /// An ellipsoid about the origin; half axes in metres.
+    ///
+    /// # Errors
+    /// If a half axis is not a finite length above zero.
+    pub fn ellipsoid(half_axes: Vec3) -> Result<Self, ShapeError> {
+        for axis in 0..3 {
+            positive("ellipsoid half axis", half_axes[axis])?;
+        }
+        Self::sphere(1.0)?.transformed(Mat3::from_diagonal(half_axes), Vec3::ZERO)
+    }
+
+    /// This shape after `x → linear · x + translation`: moved, turned, scaled (also by negative numbers) or sheared.
+    ///
+    /// Cuboids and hulls become hulls, clouds and triangles stay what they are, meshes are copied with their triangles
+    /// turned around where the map mirrors; other convex shapes become [`Transformed`] ones.
+    ///
+    /// # Errors
+    /// If a number is not finite, the map is (almost) flat, or the shape is a half-space.
+    pub fn transformed(&self, linear: Mat3, translation: Vec3) -> Result<Self, ShapeError> {
+        transformed::inverse_of(linear, translation)?;
+        let map = |point: Vec3| linear * point + translation;
+        let all = |points: &[Vec3]| points.iter().map(|&point| map(point)).collect::<Vec<_>>();
+        match self {
+            Self::Cuboid(s) => Self::hull(&all(&ConvexHull::from_cuboid(s.half_extents())?.vertices().to_vec())),
+            Self::Hull(s) => Self::hull(&all(s.vertices())),
+            Self::PointCloud(s) => Self::point_cloud(&all(s.points())),
+            Self::Triangle(s) => Self::triangle(s.corners().map(map)),
+            Self::Mesh(s) => {
+                let mirrored = linear.determinant() < 0.0;
+                let turn = |[a, b, c]: [u32; 3]| if mirrored { [a, c, b] } else { [a, b, c] };
+                let triangles = s.triangles().iter().map(|&t| turn(t)).collect();
+                let mesh = TriangleMesh::with_sides(all(s.vertices()), triangles, s.sides())?;
+                Ok(Self::Mesh(Arc::new(mesh)))
+            }
+            _ => Transformed::new(self, linear, translation).map(|shape| Self::Transformed(Arc::new(shape))),
+        }
+    }
+
+    /// This shape scaled along its axes; negative factors mirror.
+    ///
+    /// ```
+    /// use arbiter3d::{Shape, math::Vec3};
+    /// let coin = Shape::cylinder(0.5, 0.5)?.scaled(Vec3::new(2.0, 0.1, 2.0))?;
+    /// assert!((coin.local_aabb().half_extents() - Vec3::new(1.0, 0.05, 1.0)).length() < 1e-5);
+    /// # Ok::<(), arbiter3d::ShapeError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Shape::transformed`].
+    pub fn scaled(&self, scale: Vec3) -> Result<Self, ShapeError> {
+        self.transformed(Mat3::from_diagonal(scale), Vec3::ZERO)
+    }
+
+    /// A convex shape of your own: see [`ConvexShape`].
+    ///
+    /// # Errors
+    /// If its support function, tried in some hundred directions, or its box makes no sense.
+    pub fn custom(shape: impl ConvexShape + 'static) -> Result<Self, ShapeError> {
+        Custom::new(Box::new(shape)).map(|custom| Self::Custom(Arc::new(custom)))
+    }
+
+    /// What tells of the shape, whatever its kind.
+    pub(crate) fn geometry(&self) -> &dyn Geometry {
+        match self {
+            Self::Sphere(s) => s,
+            Self::Capsule(s) => s,
+            Self::Cuboid(s) => s,
+            Self::Hull(s) => &**s,
+            Self::Mesh(s) => &**s,
+            Self::Cylinder(s) => s,
+            Self::Cone(s) => s,
+            Self::TaperedCapsule(s) => s,
+            Self::HalfSpace(s) => s,
+            Self::Triangle(s) => &**s,
+            Self::PointCloud(s) => &**s,
+            Self::Rounded(s) => &**s,
+            Self::Transformed(s) => &**s,
+            Self::Custom(s) => &**s,
+        }
+    }
+
     /// The box around the shape in its own frame.
     #[must_use]
     pub fn local_aabb(&self) -> Aabb {
-        match self {
-            Self::Sphere(s) => s.local_aabb(),
-            Self::Capsule(s) => s.local_aabb(),
-            Self::Cuboid(s) => s.local_aabb(),
-            Self::Hull(s) => s.local_aabb(),
-            Self::Mesh(s) => s.local_aabb(),
-        }
+        self.geometry().local_aabb()
     }
 
     /// The box around the shape placed by `pose`.
     #[inline]
     #[must_use]
     pub fn aabb(&self, pose: &Pose) -> Aabb {
+        // The kinds that worlds are full of without a call through a table.
         match self {
             Self::Sphere(s) => Aabb::from_center(pose.position, Vec3::splat(s.radius())),
             Self::Capsule(s) => s.aabb(pose),
             Self::Cuboid(s) => s.aabb(pose),
             Self::Hull(s) => s.aabb(pose),
-            Self::Mesh(s) => s.local_aabb().transform(pose),
+            other => other.geometry().aabb(pose),
         }
     }
 
-    /// Mass, centre and inertia at `density` (kg/m³); `None` for a mesh, which has no inside.
-    #[must_use]
-    pub fn mass_properties(&self, density: Real) -> Option<MassProperties> {
-        match self {
-            Self::Sphere(s) => Some(s.mass_properties(density)),
-            Self::Capsule(s) => Some(s.mass_properties(density)),
-            Self::Cuboid(s) => Some(s.mass_properties(density)),
-            Self::Hull(s) => Some(s.mass_properties(density)),
-            Self::Mesh(_) => None,
-        }
+    /// Mass, centre and inertia at `density` (kg/m³).
+    ///
+    /// # Errors
+    /// If the shape has no volume: a half-space, a triangle, a flat cloud, a mesh that is not closed.
+    pub fn mass_properties(&self, density: Real) -> Result<MassProperties, ShapeError> {
+        self.geometry().mass_properties(density)
     }
 
-    /// Radius of a ball that fits inside: how far the shape may move in a step before it can tunnel. Zero for meshes.
+    /// Radius of a ball that fits inside: how far the shape may move in a step before it can tunnel. Zero for meshes and
+    /// what else has no inside.
     #[must_use]
     pub fn inner_radius(&self) -> Real {
-        match self {
-            Self::Sphere(s) => s.radius(),
-            Self::Capsule(s) => s.radius(),
-            Self::Cuboid(s) => s.half_extents().min_element(),
-            Self::Hull(s) => s.inner_radius(),
-            Self::Mesh(_) => 0.0,
-        }
+        self.inner_ball().1
     }
 
-    /// Distance of the farthest point of the shape from the origin of its frame, metres; for meshes an upper bound.
+    /// Centre and radius of a ball that fits inside.
+    #[must_use]
+    pub fn inner_ball(&self) -> (Vec3, Real) {
+        self.geometry().inner_ball()
+    }
+
+    /// Distance of the farthest point of the shape from the origin of its frame, metres; for some kinds an upper bound.
     #[must_use]
     pub fn reach(&self) -> Real {
         self.reach_from(Vec3::ZERO)
     }
 
-    /// Distance of the farthest point of the shape from a point of its frame; for meshes an upper bound.
+    /// Distance of the farthest point of the shape from a point of its frame; for some kinds an upper bound.
     pub(crate) fn reach_from(&self, point: Vec3) -> Real {
-        match self {
-            Self::Sphere(s) => point.length() + s.radius(),
-            Self::Capsule(s) => {
-                let along = Vec3::new(point.x, point.y.abs() + s.half_length(), point.z);
-                along.length() + s.radius()
-            }
-            Self::Cuboid(s) => (crate::math::abs3(point) + s.half_extents()).length(),
-            Self::Hull(s) => s.vertices().iter().fold(0.0, |far, v| crate::math::max((*v - point).length(), far)),
-            Self::Mesh(s) => s.local_aabb().farthest_from(point).length(),
-        }
+        self.geometry().reach_from(point)
     }
 
     /// The radius that rolls: how far the surface is from the inner core of a rounded shape, zero for polyhedra.
     #[must_use]
     pub fn rounding_radius(&self) -> Real {
+        self.geometry().rounding_radius()
+    }
+
+    /// Corners and triangles of the surface, for drawing and exporting; the triangles wind counter-clockwise from outside.
+    ///
+    /// Cuboids, hulls and meshes as they are; other convex shapes through about `4 steps²` points of their surface, at least
+    /// one step, at most 64. A half-space gives a square of 200 m.
+    ///
+    /// ```
+    /// use arbiter3d::Shape;
+    /// let (corners, triangles) = Shape::sphere(2.0)?.triangulate(8);
+    /// assert!(corners.iter().all(|corner| (corner.length() - 2.0).abs() < 1e-5));
+    /// assert_eq!(triangles.len(), 8 * 8 * 8);
+    /// # Ok::<(), arbiter3d::ShapeError>(())
+    /// ```
+    #[must_use]
+    pub fn triangulate(&self, steps: usize) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+        let fan = |hull: &ConvexHull| {
+            let mut triangles = Vec::new();
+            for face in 0..hull.planes().len() {
+                let corners: Vec<u32> = hull.face_vertices(face).map(|corner| corner as u32).collect();
+                triangles.extend(corners.windows(2).skip(1).map(|pair| [corners[0], pair[0], pair[1]]));
+            }
+            (hull.vertices().to_vec(), triangles)
+        };
         match self {
-            Self::Sphere(s) => s.radius(),
-            Self::Capsule(s) => s.radius(),
-            _ => 0.0,
+            Self::Cuboid(s) => {
+                ConvexHull::from_cuboid(s.half_extents()).map_or_else(|_| Default::default(), |h| fan(&h))
+            }
+            Self::Hull(s) => fan(s),
+            Self::Mesh(s) => (s.vertices().to_vec(), s.triangles().to_vec()),
+            Self::Triangle(s) => (s.corners().to_vec(), vec![[0, 1, 2], [0, 2, 1]]),
+            Self::HalfSpace(_) => {
+                let corners = [(-1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (1.0, -1.0)];
+                (corners.map(|(x, z)| Vec3::new(100.0 * x, 0.0, 100.0 * z)).to_vec(), vec![[0, 1, 2], [0, 2, 3]])
+            }
+            other => Support::new(other)
+                .map_or_else(Default::default, |support| convex::surface_of_support(&support, steps.clamp(1, 64))),
         }
     }
 
-    /// Whether the shape has an inside, so that dynamic bodies may carry it.
+    /// Whether the shape is convex and bounded.
     #[must_use]
     pub fn is_convex(&self) -> bool {
-        !matches!(self, Self::Mesh(_))
+        Support::new(self).is_some()
     }
 }

@@ -1,7 +1,9 @@
 //! Spheres.
 
+use super::geometry::Geometry;
 use super::{MassProperties, ShapeError, positive};
-use crate::math::{Aabb, Real, SymmetricMat3, Vec3};
+use crate::math::{Aabb, Pose, Real, SymmetricMat3, Vec3};
+use crate::query::{Ray, ShapeHit, cast_sphere};
 
 /// A ball about the origin of its frame.
 ///
@@ -40,5 +42,35 @@ impl Sphere {
         let r = self.radius;
         let mass = density * (4.0 / 3.0) * std::f32::consts::PI as Real * r * r * r;
         MassProperties { mass, center: Vec3::ZERO, inertia: SymmetricMat3::diagonal(Vec3::splat(0.4 * mass * r * r)) }
+    }
+}
+
+impl Geometry for Sphere {
+    fn local_aabb(&self) -> Aabb {
+        self.local_aabb()
+    }
+
+    fn aabb(&self, pose: &Pose) -> Aabb {
+        Aabb::from_center(pose.position, Vec3::splat(self.radius))
+    }
+
+    fn mass_properties(&self, density: Real) -> Result<MassProperties, ShapeError> {
+        Ok(self.mass_properties(density))
+    }
+
+    fn inner_ball(&self) -> (Vec3, Real) {
+        (Vec3::ZERO, self.radius)
+    }
+
+    fn reach_from(&self, point: Vec3) -> Real {
+        point.length() + self.radius
+    }
+
+    fn rounding_radius(&self) -> Real {
+        self.radius
+    }
+
+    fn cast_ray(&self, ray: &Ray) -> Option<ShapeHit> {
+        cast_sphere(self.radius, ray)
     }
 }

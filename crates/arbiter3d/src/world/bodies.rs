@@ -644,7 +644,7 @@ impl World {
         let mut sum = MassProperties::default();
         for &slot in &self.bodies[index as usize].shape_slots {
             let shape = &self.shapes[slot as usize];
-            if let (false, Some(mass)) = (shape.sensor, shape.geometry.mass_properties(shape.density)) {
+            if let (false, Ok(mass)) = (shape.sensor, shape.geometry.mass_properties(shape.density)) {
                 let mass = mass.transform(&shape.pose);
                 sum = if sum.mass > 0.0 { sum.combine(&mass) } else { mass };
             }

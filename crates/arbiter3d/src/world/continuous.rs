@@ -17,6 +17,7 @@
 use super::World;
 use super::bodies::Body;
 use super::definition::BodyKind;
+use super::one_way;
 use super::settings::WorldSettings;
 use super::shapes::ShapeSlot;
 use crate::broad_phase::BroadPhase;
@@ -118,6 +119,10 @@ impl ImpactSearch<'_> {
             if body.kind == BodyKind::Static && !other.sensor && mover.shape.filter.accepts(&other.filter) {
                 let pose = body.pose.mul(&other.pose);
                 let mover = mover.relative_to(&pose);
+                let ends = (&mover.path.start, &mover.path.end);
+                if one_way::lets_pass(other, &mover.shape.geometry, ends, self.settings.speculative_distance) {
+                    return;
+                }
                 let impact = match &other.geometry {
                     Shape::Mesh(mesh) => self.mesh_impact(mesh, &mover, near),
                     convex => Support::new(convex).and_then(|fixed| self.impact(&fixed, &mover)),
@@ -190,7 +195,7 @@ impl Way {
             Shape::Capsule(s) => (Vec3::ZERO, s.half_length()),
             Shape::Cuboid(s) => (Vec3::ZERO, (s.half_extents() - Vec3::splat(thickness)).length() - thickness),
             Shape::Hull(hull) => (hull.centroid(), 0.0),
-            Shape::Mesh(_) => return false,
+            other => (other.inner_ball().0, 0.0),
         };
         let middle = shape.from_center.transform_point(middle);
         let moved = (self.end.transform_point(middle) - self.start.transform_point(middle)).length();
@@ -221,7 +226,7 @@ impl<'a> Mover<'a> {
                 (Support::Cuboid(Cuboid::new(s.half_extents() - Vec3::splat(thickness)).ok()?), Vec3::ZERO)
             }
             Shape::Hull(hull) => (Support::Sphere(Sphere::new(thickness).ok()?), hull.centroid()),
-            Shape::Mesh(_) => return None,
+            other => (Support::Sphere(Sphere::new(thickness).ok()?), other.inner_ball().0),
         };
         // A hull's frame may be far from the hull (a part of a tree is given about the tree's foot): it turns about its middle.
         let on_body = &shape.from_center;

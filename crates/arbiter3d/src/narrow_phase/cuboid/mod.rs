@@ -30,7 +30,8 @@ mod lanes;
 pub(crate) use axes::Near;
 pub(crate) use lanes::{CuboidLanes, CuboidPair, WideManifold};
 
-use super::distance::{Support, closest};
+use super::distance::closest;
+use super::support::Support;
 use super::{Manifold, ManifoldPoint};
 use crate::math::{Mat3, Pose, Real, Vec3, clamp};
 use crate::shape::Cuboid;

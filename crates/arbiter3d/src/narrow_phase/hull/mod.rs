@@ -29,8 +29,9 @@ mod edges;
 mod view;
 
 use super::cuboid::{ALIGNED, EDGE_BIAS, stands_in};
-use super::distance::{Support, closest};
+use super::distance::closest;
 use super::polyhedron::{CuboidFeatures, Polyhedron};
+use super::support::Support;
 use super::{Manifold, ManifoldPoint, PairCache};
 use crate::math::{Mat3, Pose, Real, Vec3, clamp, min};
 use crate::shape::{ConvexHull, Cuboid, Plane};

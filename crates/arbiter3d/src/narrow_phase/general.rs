@@ -1,0 +1,286 @@
+//! Convex shapes known by their support and their features: cylinders, cones, tapered capsules, triangles, clouds, rounded
+//! and transformed shapes, and those of the user's own, against each other and against every other convex shape.
+//!
+//! The closest points of the cores (`distance`), or where these overlap the least way out (`penetration`), give the normal and
+//! the separation. Then each shape tells what of it lies most along the normal: a face, a line or a point. Both are seen
+//! along the normal, as figures in the plane square to it: where they overlap, the gap between the two surfaces along the
+//! normal is the difference of two linear heights, and its corners make the manifold. The closest point itself is added
+//! where the corners miss it. So a can stands on four points of its rim, rolls on a line, and balances on a point.
+//!
+//! Nothing in this prefers one of the two shapes: with roles exchanged, the same points come out, mirrored.
+
+use super::clip::{ClipPoint, choose_four, clip_polygon};
+use super::distance::closest;
+use super::penetration::penetration;
+use super::support::Support;
+use super::{Manifold, ManifoldPoint};
+use crate::math::{Mat3, Pose, Real, Vec3, clamp, max, min, tangents};
+use crate::shape::{FEATURE_POINTS, Feature, Shape};
+
+/// Lines whose angle has a sine below this are parallel: two points.
+const PARALLEL_SINE: Real = 0.05;
+/// The corners miss the closest point if they are all farther by this share of the smaller size.
+const MISSED: Real = 1e-4;
+/// Corners of two features clipped by each other at most.
+const CLIPPED: usize = 2 * FEATURE_POINTS;
+/// The feature number of a closest point that no corner stands for.
+const WITNESS: u32 = 0x7FFF_FFFF;
+
+/// Contacts of two convex shapes of any kind; nothing for others.
+pub(crate) fn collide((shape1, shape2): (&Shape, &Shape), pose: &Pose, margin: Real, manifold: &mut Manifold) {
+    manifold.clear();
+    if let (Some(support1), Some(support2)) = (Support::new(shape1), Support::new(shape2)) {
+        collide_supports((&support1, &support2), pose, margin, manifold);
+    }
+}
+
+/// [`collide`] for support maps.
+pub(crate) fn collide_supports(
+    (support1, support2): (&Support<'_>, &Support<'_>),
+    pose: &Pose,
+    margin: Real,
+    manifold: &mut Manifold,
+) {
+    if let Some(touch) = Touch::find(support1, support2, pose, margin) {
+        let size = min(support1.inner_ball().1, support2.inner_ball().1);
+        let size = if size > 0.0 { size } else { max(support1.inner_ball().1, support2.inner_ball().1) };
+        touch.contacts((support1, support2), pose, (margin, size), manifold);
+    }
+}
+
+/// The nearest points of two shapes, or the deepest ones.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Touch {
+    /// On the surface of shape 1, in its frame.
+    pub point1: Vec3,
+    /// Unit vector from shape 1 to shape 2.
+    pub normal: Vec3,
+    /// Gap, metres; negative where the shapes overlap.
+    pub separation: Real,
+}
+
+impl Touch {
+    /// `None` if the shapes are apart by more than `margin`.
+    pub fn find(support1: &Support<'_>, support2: &Support<'_>, pose: &Pose, margin: Real) -> Option<Self> {
+        let (radius1, radius2) = (support1.radius(), support2.radius());
+        if let Some(c) = closest(support1, support2, pose) {
+            let separation = c.distance - radius1 - radius2;
+            let point1 = c.point1 + c.normal * radius1;
+            return (separation <= margin).then_some(Self { point1, normal: c.normal, separation });
+        }
+        let p = penetration(support1, support2, pose)?;
+        let point1 = p.point1 + p.normal * radius1;
+        Some(Self { point1, normal: p.normal, separation: -p.depth - radius1 - radius2 })
+    }
+
+    /// All points that carry the contact.
+    fn contacts(
+        &self,
+        (support1, support2): (&Support<'_>, &Support<'_>),
+        pose: &Pose,
+        (margin, size): (Real, Real),
+        manifold: &mut Manifold,
+    ) {
+        let (mut feature1, mut feature2) = (Feature::default(), Feature::default());
+        support1.feature(self.normal, &mut feature1);
+        support2.feature(-pose.rotation.inverse_rotate(self.normal), &mut feature2);
+        feature2.points_mut().iter_mut().for_each(|point| *point = pose.transform_point(*point));
+        self.patch((&feature1, &feature2), (margin, size), manifold);
+    }
+
+    /// The manifold of two features in the frame of shape 1.
+    pub fn patch(
+        &self,
+        (feature1, feature2): (&Feature, &Feature),
+        (margin, size): (Real, Real),
+        manifold: &mut Manifold,
+    ) {
+        let (t1, t2) = tangents(self.normal);
+        let view = View { point: self.point1, to_plane: Mat3::from_cols(t1, t2, self.normal).transpose() };
+        let (figure1, figure2) = (Figure::new(feature1, &view), Figure::new(feature2, &view));
+        let mut corners = [ClipPoint::default(); CLIPPED];
+        let count = figure1.overlap(&figure2, &mut corners);
+        let mut kept = 0;
+        for k in 0..count {
+            let p = corners[k].position;
+            let low = figure1.height(p.x, p.y);
+            let separation = figure2.height(p.x, p.y) - low;
+            if separation <= margin && separation.is_finite() {
+                let position = Vec3::new(p.x, p.y, low);
+                corners[kept] = ClipPoint { position, separation, feature: corners[k].feature };
+                kept += 1;
+            }
+        }
+        let corners = &corners[..kept];
+        let lowest = corners.iter().fold(Real::MAX, |m, c| min(c.separation, m));
+        let (chosen, mut chosen_count) = if kept <= 4 {
+            ([0, 1, 2, 3], kept)
+        } else {
+            choose_four(kept, |i| (corners[i].position.x, corners[i].position.y), |i| corners[i].separation, size)
+        };
+        if lowest > self.separation + MISSED * size {
+            chosen_count = chosen_count.min(3);
+            let (point1, normal, separation) = (self.point1, self.normal, self.separation);
+            manifold.push(ManifoldPoint { point1, normal, separation, feature: WITNESS });
+        }
+        for &k in &chosen[..chosen_count] {
+            let ClipPoint { position, separation, feature } = corners[k];
+            let point1 = view.point + t1 * position.x + t2 * position.y + self.normal * position.z;
+            manifold.push(ManifoldPoint { point1, normal: self.normal, separation, feature });
+        }
+    }
+}
+
+/// Where a contact is looked at from: along its normal, about a point.
+struct View {
+    point: Vec3,
+    /// Two tangents and the normal, as rows.
+    to_plane: Mat3,
+}
+
+/// A feature in the plane square to the normal, and how high it is over that plane.
+struct Figure {
+    corners: [Vec3; FEATURE_POINTS],
+    count: usize,
+    /// `height = slope · (x, y) + base`.
+    slope: [Real; 2],
+    base: Real,
+}
+
+impl Figure {
+    /// The figure of a feature, winding counter-clockwise.
+    fn new(feature: &Feature, view: &View) -> Self {
+        let mut corners = [Vec3::ZERO; FEATURE_POINTS];
+        let count = feature.points().len();
+        for (corner, point) in corners.iter_mut().zip(feature.points()) {
+            *corner = view.to_plane * (*point - view.point);
+        }
+        let mut figure = Self { corners, count, slope: [0.0; 2], base: corners[0].z };
+        match count {
+            0 | 1 => {}
+            2 => figure.lean_along_line(),
+            _ => figure.lean_in_plane(),
+        }
+        figure
+    }
+
+    /// Of a line: its height changes along it only.
+    fn lean_along_line(&mut self) {
+        let along = self.corners[1] - self.corners[0];
+        let squared = along.x * along.x + along.y * along.y;
+        if squared > 0.0 {
+            self.slope = [along.z * along.x / squared, along.z * along.y / squared];
+            self.base = self.corners[0].z - self.slope[0] * self.corners[0].x - self.slope[1] * self.corners[0].y;
+        }
+    }
+
+    /// Of a face: its plane, by Newell's sum over its edges, through the middle of its corners.
+    fn lean_in_plane(&mut self) {
+        let (mut normal, mut middle) = (Vec3::ZERO, Vec3::ZERO);
+        for k in 0..self.count {
+            let (a, b) = (self.corners[k], self.corners[(k + 1) % self.count]);
+            normal += (a - self.corners[0]).cross(b - self.corners[0]);
+            middle += a;
+        }
+        middle *= 1.0 / self.count as Real;
+        if normal.z < 0.0 {
+            self.corners[..self.count].reverse();
+        }
+        if normal.z.abs() > 0.05 * normal.length() {
+            self.slope = [-normal.x / normal.z, -normal.y / normal.z];
+        }
+        self.base = middle.z - self.slope[0] * middle.x - self.slope[1] * middle.y;
+    }
+
+    fn height(&self, x: Real, y: Real) -> Real {
+        self.slope[0] * x + self.slope[1] * y + self.base
+    }
+
+    /// Corners of what two figures share; none where one of them is a point, or lines cross: the closest point says it all.
+    fn overlap(&self, other: &Self, out: &mut [ClipPoint; CLIPPED]) -> usize {
+        match (self.count, other.count) {
+            (0 | 1, _) | (_, 0 | 1) => 0,
+            (2, 2) => self.shared_stretch(other, out),
+            (2, _) => other.clip_line(self, out),
+            (_, 2) => self.clip_line(other, out),
+            _ => self.clip_face(other, out),
+        }
+    }
+
+    /// Ends of the stretch that two parallel lines share.
+    fn shared_stretch(&self, other: &Self, out: &mut [ClipPoint; CLIPPED]) -> usize {
+        let flat = |v: Vec3| Vec3::new(v.x, v.y, 0.0);
+        let (a, along) = (flat(self.corners[0]), flat(self.corners[1] - self.corners[0]));
+        let other_along = flat(other.corners[1] - other.corners[0]);
+        let squared = along.length_squared();
+        let cross = along.x * other_along.y - along.y * other_along.x;
+        if cross * cross > PARALLEL_SINE * PARALLEL_SINE * squared * other_along.length_squared() || squared == 0.0 {
+            return 0;
+        }
+        let [p, q] = [other.corners[0], other.corners[1]].map(|end| flat(end - a).dot(along) / squared);
+        let (low, high) = (max(min(p, q), 0.0), min(max(p, q), 1.0));
+        if high - low < 1e-3 {
+            return 0;
+        }
+        for (k, share) in [low, high].into_iter().enumerate() {
+            // Half way between the two lines.
+            let own = a + along * share;
+            let there = flat(other.corners[0]) + other_along * clamp((share - p) / (q - p), 0.0, 1.0);
+            out[k] = ClipPoint { position: (own + there) * 0.5, separation: 0.0, feature: k as u32 + 1 };
+        }
+        2
+    }
+
+    /// Ends of the part of a line that is over this face.
+    fn clip_line(&self, line: &Self, out: &mut [ClipPoint; CLIPPED]) -> usize {
+        let (p, q) = (line.corners[0], line.corners[1]);
+        let (mut enter, mut leave) = (0.0, 1.0);
+        let (mut first, mut last) = (0, 0);
+        for k in 0..self.count {
+            let (normal, offset) = self.side(k);
+            let (from, to) = (normal.dot(p) - offset, normal.dot(q) - offset);
+            if from > 0.0 && to > 0.0 {
+                return 0;
+            }
+            if from > 0.0 && from / (from - to) > enter {
+                (enter, first) = (from / (from - to), k + 1);
+            } else if to > 0.0 && from / (from - to) < leave {
+                (leave, last) = (from / (from - to), k + 1);
+            }
+        }
+        if enter > leave {
+            return 0;
+        }
+        for (end, (share, cut)) in [(enter, first), (leave, last)].into_iter().enumerate() {
+            let feature = 0x100 | (cut as u32) << 1 | end as u32;
+            out[end] = ClipPoint { position: p + (q - p) * share, separation: 0.0, feature };
+        }
+        2
+    }
+
+    /// Outward normal of a side and where it is.
+    fn side(&self, k: usize) -> (Vec3, Real) {
+        let (a, b) = (self.corners[k], self.corners[(k + 1) % self.count]);
+        let normal = Vec3::new(b.y - a.y, a.x - b.x, 0.0);
+        (normal, normal.dot(a))
+    }
+
+    /// Corners of the part of another face that is over this one.
+    fn clip_face(&self, other: &Self, out: &mut [ClipPoint; CLIPPED]) -> usize {
+        let mut buffer = [ClipPoint::default(); CLIPPED];
+        let (mut front, mut back) = (out, &mut buffer);
+        for k in 0..other.count {
+            front[k] = ClipPoint { position: other.corners[k], separation: 0.0, feature: (k as u32 + 1) << 12 };
+        }
+        let mut count = other.count;
+        for k in 0..self.count {
+            count = clip_polygon(&front[..count], self.side(k), k as u32, &mut back[..]);
+            std::mem::swap(&mut front, &mut back);
+        }
+        if self.count % 2 == 1 {
+            // The last result is in the spare buffer, which the other name holds now.
+            back.copy_from_slice(&front[..]);
+        }
+        count
+    }
+}

@@ -1,0 +1,215 @@
+//! Convex shapes as the general algorithms see them: a core, known by its farthest points, grown by a radius.
+
+use crate::math::{Aabb, Pose, Real, Vec3};
+use crate::shape::{
+    Capsule, Cone, ConvexHull, Cuboid, Custom, Cylinder, FLAT_SINE, Feature, Geometry, PointCloud, Rounded, Shape,
+    Sphere, TaperedCapsule, Transformed, triangle_feature,
+};
+use glam::DVec3;
+
+use super::polyhedron::{CuboidFeatures, Polyhedron};
+
+/// A convex shape as a core with a radius.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Support<'a> {
+    Sphere(Sphere),
+    Capsule(Capsule),
+    Cuboid(Cuboid),
+    Hull(&'a ConvexHull),
+    Triangle([Vec3; 3]),
+    Cylinder(Cylinder),
+    Cone(Cone),
+    TaperedCapsule(TaperedCapsule),
+    Cloud(&'a PointCloud),
+    Rounded(&'a Rounded),
+    Transformed(&'a Transformed),
+    Custom(&'a Custom),
+}
+
+impl<'a> Support<'a> {
+    /// The support map of a shape; `None` for what is not convex or not bounded.
+    pub(crate) fn new(shape: &'a Shape) -> Option<Self> {
+        Some(match shape {
+            Shape::Sphere(s) => Self::Sphere(*s),
+            Shape::Capsule(s) => Self::Capsule(*s),
+            Shape::Cuboid(s) => Self::Cuboid(*s),
+            Shape::Hull(s) => Self::Hull(s),
+            Shape::Triangle(s) => Self::Triangle(s.corners()),
+            Shape::Cylinder(s) => Self::Cylinder(*s),
+            Shape::Cone(s) => Self::Cone(*s),
+            Shape::TaperedCapsule(s) => Self::TaperedCapsule(*s),
+            Shape::PointCloud(s) => Self::Cloud(s),
+            Shape::Rounded(s) => Self::Rounded(s),
+            Shape::Transformed(s) => Self::Transformed(s),
+            Shape::Custom(s) => Self::Custom(s),
+            Shape::Mesh(_) | Shape::HalfSpace(_) => return None,
+        })
+    }
+
+    /// How far the surface is from the core, metres.
+    #[inline]
+    pub(crate) fn radius(&self) -> Real {
+        match self {
+            Self::Sphere(s) => s.radius(),
+            Self::Capsule(s) => s.radius(),
+            Self::TaperedCapsule(s) => s.core_radius(),
+            Self::Rounded(s) => s.radius() + Self::new(s.core()).map_or(0.0, |core| core.radius()),
+            _ => 0.0,
+        }
+    }
+
+    /// A point of the core that is furthest along `direction`.
+    #[inline]
+    pub(crate) fn core_support(&self, direction: DVec3) -> DVec3 {
+        let sign = |d: f64, h: Real| if d < 0.0 { -f64::from(h) } else { f64::from(h) };
+        match self {
+            Self::Sphere(_) => DVec3::ZERO,
+            Self::Capsule(s) => DVec3::new(0.0, sign(direction.y, s.half_length()), 0.0),
+            Self::Cuboid(s) => {
+                let h = s.half_extents();
+                DVec3::new(sign(direction.x, h.x), sign(direction.y, h.y), sign(direction.z, h.z))
+            }
+            Self::Hull(s) => furthest(s.vertices(), direction),
+            Self::Triangle(corners) => furthest(corners, direction),
+            Self::Cylinder(s) => s.support(direction),
+            Self::Cone(s) => s.support(direction),
+            Self::TaperedCapsule(s) => s.core_support(direction),
+            Self::Cloud(s) => furthest(s.points(), direction),
+            Self::Rounded(s) => Self::new(s.core()).map_or(DVec3::ZERO, |core| core.core_support(direction)),
+            Self::Transformed(s) => s.support(direction),
+            Self::Custom(s) => s.support(direction),
+        }
+    }
+
+    /// A point of the shape that is furthest along `direction`.
+    pub(crate) fn full_support(&self, direction: DVec3) -> DVec3 {
+        let (core, radius) = (self.core_support(direction), f64::from(self.radius()));
+        let length = direction.length();
+        if radius > 0.0 && length > 0.0 { core + direction * (radius / length) } else { core }
+    }
+
+    /// What else is known of the shape.
+    fn geometry(&self) -> Option<&dyn Geometry> {
+        Some(match self {
+            Self::Sphere(s) => s,
+            Self::Capsule(s) => s,
+            Self::Cuboid(s) => s,
+            Self::Hull(s) => *s,
+            Self::Triangle(_) => return None,
+            Self::Cylinder(s) => s,
+            Self::Cone(s) => s,
+            Self::TaperedCapsule(s) => s,
+            Self::Cloud(s) => *s,
+            Self::Rounded(s) => *s,
+            Self::Transformed(s) => *s,
+            Self::Custom(s) => *s,
+        })
+    }
+
+    /// The box around the shape placed by `pose`.
+    pub(crate) fn bounds(&self, pose: &Pose) -> Aabb {
+        match self {
+            Self::Sphere(s) => Aabb::from_center(pose.position, Vec3::splat(s.radius())),
+            Self::Capsule(s) => s.aabb(pose),
+            Self::Cuboid(s) => s.aabb(pose),
+            Self::Hull(s) => s.local_aabb().transform(pose),
+            Self::Triangle(corners) => Aabb::from_points(corners.map(|corner| pose.transform_point(corner))),
+            other => other.geometry().map_or(Aabb::EMPTY, |shape| shape.aabb(pose)),
+        }
+    }
+
+    /// How far the shape reaches along a unit vector of its frame, metres.
+    pub(crate) fn extent(&self, direction: Vec3) -> Real {
+        let longest = |points: &[Vec3]| points.iter().fold(-Real::MAX, |m, p| crate::math::max(p.dot(direction), m));
+        match self {
+            Self::Sphere(s) => s.radius(),
+            Self::Capsule(s) => s.half_length() * direction.y.abs() + s.radius(),
+            Self::Cuboid(s) => s.half_extents().dot(crate::math::abs3(direction)),
+            Self::Hull(s) => longest(s.vertices()),
+            Self::Triangle(corners) => longest(corners),
+            other => {
+                let d = direction.as_dvec3();
+                other.full_support(d).dot(d) as Real
+            }
+        }
+    }
+
+    /// Largest distance of a point of the shape from `pivot`, a point in its frame, metres.
+    pub(crate) fn reach(&self, pivot: Vec3) -> Real {
+        let squared = |p: &Vec3| (*p - pivot).length_squared();
+        let longest = |points: &[Vec3]| points.iter().fold(0.0, |m, p| crate::math::max(squared(p), m)).sqrt();
+        let around_origin = match self {
+            Self::Sphere(s) => s.radius(),
+            Self::Capsule(s) => s.half_length() + s.radius(),
+            Self::Cuboid(s) => s.half_extents().length(),
+            Self::Hull(s) => return longest(s.vertices()),
+            Self::Triangle(corners) => return longest(corners),
+            other => return other.geometry().map_or(0.0, |shape| shape.reach_from(pivot)),
+        };
+        around_origin + pivot.length()
+    }
+
+    /// Centre and radius of a ball that fits inside.
+    pub(crate) fn inner_ball(&self) -> (Vec3, Real) {
+        match self {
+            Self::Triangle([a, b, c]) => ((*a + *b + *c) * (1.0 / 3.0), 0.0),
+            other => other.geometry().map_or((Vec3::ZERO, 0.0), |shape| shape.inner_ball()),
+        }
+    }
+
+    /// The face, line or point of the whole shape that lies most along a unit direction.
+    pub(crate) fn feature(&self, direction: Vec3, out: &mut Feature) {
+        let d = direction;
+        match self {
+            Self::Sphere(s) => out.push(d * s.radius()),
+            Self::Capsule(s) => {
+                let end = Vec3::Y * if d.y < 0.0 { -s.half_length() } else { s.half_length() };
+                out.push(end + d * s.radius());
+                if d.y.abs() < FLAT_SINE {
+                    out.push(d * s.radius() - end);
+                }
+            }
+            Self::Cuboid(s) => polyhedron_feature(&CuboidFeatures::new(s).view(), d, out),
+            Self::Hull(s) => polyhedron_feature(&Polyhedron::from_hull(s), d, out),
+            Self::Triangle(corners) => triangle_feature(*corners, d, out),
+            Self::Cylinder(s) => s.feature(d, out),
+            Self::Cone(s) => s.feature(d, out),
+            Self::TaperedCapsule(s) => s.feature(d, out),
+            Self::Cloud(s) => s.feature(d, out),
+            Self::Rounded(s) => s.feature(d, out),
+            Self::Transformed(s) => s.feature(d, out),
+            Self::Custom(s) => s.feature(d, out),
+        }
+    }
+}
+
+/// Of the faces around the corner furthest along `d` the one that looks most along it.
+///
+/// A solid so turned has faces within 55° there (a cube on its corner); the contact then is a point of the face, and what
+/// lies out of reach is left out by its height.
+fn polyhedron_feature(solid: &Polyhedron<'_>, d: Vec3, out: &mut Feature) {
+    let corner = solid.lowest_corner(-d);
+    let (mut best, mut cosine) = (0, -Real::MAX);
+    for &face in solid.faces_around(corner) {
+        let c = solid.planes[face as usize].normal.dot(d);
+        if c > cosine + 1e-3 {
+            (best, cosine) = (face as usize, c);
+        }
+    }
+    let count = solid.face_loop(best).count();
+    let corner_of = |edge: usize| solid.vertices[solid.edges[edge].origin as usize];
+    out.set_thinned(count, |k| solid.face_loop(best).nth(k).map_or(Vec3::ZERO, corner_of));
+}
+
+/// The first of the points that are furthest along `direction`.
+fn furthest(points: &[Vec3], direction: DVec3) -> DVec3 {
+    let (mut best, mut most) = (DVec3::ZERO, f64::MIN);
+    for point in points {
+        let point = point.as_dvec3();
+        let along = point.dot(direction);
+        if along > most {
+            (best, most) = (point, along);
+        }
+    }
+    best
+}
