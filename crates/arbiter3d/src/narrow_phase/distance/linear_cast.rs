@@ -172,7 +172,9 @@ impl Search<'_> {
         if closing <= 0.0 {
             return Cast::Miss;
         }
-        let time = self.time + larger(gap, 0.0) / closing;
+        // The plane, not the distance: it is as far away but for smooth shapes that took too many rounds, and never too far.
+        let plane = normal.dot(self.placed.corner(-v).difference) - self.radius;
+        let time = self.time + larger(plane, 0.0) / closing;
         if time > self.limit {
             return Cast::Miss;
         }
