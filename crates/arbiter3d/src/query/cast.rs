@@ -1,10 +1,12 @@
 //! Shapes that move past others: from one pose to another, until they touch.
 //!
-//! A shape that only moves along a line is cast by GJK on the moving difference (`narrow_phase::linear_cast`), one that turns
-//! as well by conservative advancement (`narrow_phase::time_of_impact`). Composites, on either side, are taken part by part.
+//! A shape that only moves along a line is cast by GJK on the moving difference (`narrow_phase::linear_cast`), one that
+//! turns as well by conservative advancement (`narrow_phase::time_of_impact`). Composites, on either side, are taken
+//! part by part.
 //!
-//! A shape that overlaps at the start hits at fraction 0; how deep and along which normal is what the narrow phase says of the
-//! two shapes as wholes. A one-sided triangle stops only shapes whose middle is in front of it when they touch, as in contacts.
+//! A shape that overlaps at the start hits at fraction 0; how deep and along which normal is what the narrow phase says
+//! of the two shapes as wholes. A one-sided triangle stops only shapes whose middle is in front of it when they touch,
+//! as in contacts.
 
 use super::pair::deepest_contact;
 use super::parts::{Part, Path, Region, Solid, visit_parts};
@@ -289,8 +291,8 @@ fn turning_cast(still: &Support, support: &Support, sweep: &Sweep, limit: Real) 
     }
 }
 
-/// Goes on from a time that may be early, for a shape that spins close to a surface, until the gap is the target's; `None` if it
-/// never is. By the same bound of the speed as in `time_of_impact`.
+/// Goes on from a time that may be early, for a shape that spins close to a surface, until the gap is the target's;
+/// `None` if it never is. By the same bound of the speed as in `time_of_impact`.
 fn approach((still, support): (&Support, &Support), sweep: &Sweep, from: Real, target: Real) -> Option<Real> {
     let (p, q) = (sweep.start.rotation, sweep.end.rotation);
     let sign = if p.dot(q) < 0.0 { -1.0 } else { 1.0 };

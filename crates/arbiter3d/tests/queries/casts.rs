@@ -19,8 +19,8 @@ fn gap(world: &World, shape: &Shape, at: &Pose, limit: f32) -> f32 {
     near.map_or(limit, |hit| hit.distance)
 }
 
-/// Every hit is a touch: the gap to the shape that was hit is under 10⁻⁴ of the size there, nothing was overlapped on the way, the
-/// normal points from the shape to the mover; and a miss overlaps nothing anywhere.
+/// Every hit is a touch: the gap to the shape that was hit is under 10⁻⁴ of the size there, nothing was overlapped on
+/// the way, the normal points from the shape to the mover; and a miss overlaps nothing anywhere.
 fn check_cast(world: &World, cast: &ShapeCast<'_>, steps: usize) -> bool {
     let filter = QueryFilter::default();
     let tolerance = 1e-4;
@@ -28,7 +28,8 @@ fn check_cast(world: &World, cast: &ShapeCast<'_>, steps: usize) -> bool {
     assert_eq!(world.cast_shape_any(cast, &filter).unwrap(), hit.is_some());
     let first = world.cast_shape_all(cast, &filter).unwrap().first().copied();
     assert_eq!(first, hit, "the first of all is the closest");
-    // Depths are rounded towards faces by the narrow phase, so that a touch may read as an overlap: look just before it.
+    // Depths are rounded towards faces by the narrow phase, so that a touch may read as an overlap: look just before
+    // it.
     let reached = hit.map_or(1.0, |hit| (hit.fraction - 1e-4).max(0.0));
     let starts_free = !world.overlap_shape_any(cast.shape, &cast.start, &filter).unwrap();
     assert_eq!(hit.is_some_and(|hit| hit.fraction == 0.0 && hit.depth > 0.0), !starts_free, "{hit:?}");

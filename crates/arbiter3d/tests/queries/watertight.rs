@@ -62,8 +62,8 @@ fn seam(random: &mut Random, vertices: &[Vec3], triangles: &[[u32; 3]]) -> Vec3 
     if random.bits().is_multiple_of(3) { a } else { a + (b - a) * random.range(0.0, 1.0) }
 }
 
-/// Rays from within a closed mesh at its seams: each hits, where it was aimed at. Rays from outside at the seams of triangles that
-/// all face the eye hit a one-sided one.
+/// Rays from within a closed mesh at its seams: each hits, where it was aimed at. Rays from outside at the seams of
+/// triangles that all face the eye hit a one-sided one.
 fn closed_mesh(count: usize) {
     let mut random = Random(73);
     let (vertices, triangles) = bumpy_ball(4);
