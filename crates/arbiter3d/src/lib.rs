@@ -50,7 +50,7 @@ pub use shape::{
 pub use simd::{SimdLevel, UnknownSimdLevel};
 pub use world::{
     BeginEvent, BeginListener, BodyDefinition, BodyId, BodyKind, BodyMut, BodyRef, CombineRule, ContactFilter,
-    ContactProvider, EndEvent, EndListener, Error, Filter, LockedAxes, Material, PairFilter, Phase, QueryFilter,
-    RayHit, SensorEvent, ShapeDefinition, ShapeId, ShapeMut, ShapePair, ShapeRef, StepContext, StepReport, Timings,
-    UNIT_TOLERANCE, World, WorldSettings,
+    ContactProvider, EndEvent, EndListener, Error, Filter, Impact, LockedAxes, Material, PairFilter, Phase,
+    QueryFilter, RayHit, SensorEvent, ShapeDefinition, ShapeId, ShapeMut, ShapePair, ShapeRef, StepContext, StepReport,
+    Timings, UNIT_TOLERANCE, World, WorldSettings,
 };

@@ -20,6 +20,8 @@ use glam::{DMat3, DVec3};
 const TOUCHING: f64 = 1e-9;
 /// The search ends when a new extreme point gains less than this share of the distance.
 const GAIN: f64 = 1e-12;
+/// Sine below which an edge lies in a face of the simplex.
+const FLAT: f64 = 1e-12;
 /// Polyhedra of 255 corners need less than 20 rounds; the cap is for rounding that goes in circles.
 const MAX_ROUNDS: usize = 64;
 
@@ -31,6 +33,8 @@ pub(crate) enum Support<'a> {
     Cuboid(Cuboid),
     Hull(&'a ConvexHull),
     Triangle([Vec3; 3]),
+    /// The hull of some points.
+    Points(&'a [Vec3]),
 }
 
 impl<'a> Support<'a> {
@@ -68,6 +72,7 @@ impl<'a> Support<'a> {
             }
             Self::Hull(s) => furthest(s.vertices(), direction),
             Self::Triangle(corners) => furthest(corners, direction),
+            Self::Points(points) => furthest(points, direction),
         }
     }
 
@@ -79,6 +84,7 @@ impl<'a> Support<'a> {
             Self::Cuboid(s) => s.aabb(pose),
             Self::Hull(s) => s.local_aabb().transform(pose),
             Self::Triangle(corners) => Aabb::from_points(corners.map(|corner| pose.transform_point(corner))),
+            Self::Points(points) => Aabb::from_points(points.iter().map(|point| pose.transform_point(*point))),
         }
     }
 
@@ -91,6 +97,7 @@ impl<'a> Support<'a> {
             Self::Cuboid(s) => s.half_extents().dot(crate::math::abs3(direction)),
             Self::Hull(s) => longest(s.vertices()),
             Self::Triangle(corners) => longest(corners),
+            Self::Points(points) => longest(points),
         }
     }
 
@@ -104,8 +111,30 @@ impl<'a> Support<'a> {
             Self::Cuboid(s) => s.half_extents().length(),
             Self::Hull(s) => return longest(s.vertices()),
             Self::Triangle(corners) => return longest(corners),
+            Self::Points(points) => return longest(points),
         };
         around_origin + pivot.length()
+    }
+
+    /// Largest distance of a point of the core from the line through `pivot` along `axis`, a unit vector of the shape's frame,
+    /// metres: how fast the core's fastest point goes when it turns about that line. A log that rolls about its own axis is
+    /// slow, and the radius of what is round does not count at all.
+    pub(crate) fn swing(&self, pivot: Vec3, axis: Vec3) -> Real {
+        let lever = |p: Vec3| (p - pivot).cross(axis).length_squared();
+        let longest = |points: &[Vec3]| points.iter().fold(0.0, |m, p| crate::math::max(lever(*p), m)).sqrt();
+        match self {
+            Self::Sphere(_) => lever(Vec3::ZERO).sqrt(),
+            Self::Capsule(s) => longest(&[Vec3::Y * s.half_length(), Vec3::Y * -s.half_length()]),
+            Self::Cuboid(s) => {
+                let h = s.half_extents();
+                let side = |i: u8, bit: u8, half: Real| if i >> bit & 1 == 1 { half } else { -half };
+                let corner = |i: u8| Vec3::new(side(i, 0, h.x), side(i, 1, h.y), side(i, 2, h.z));
+                longest(&[0, 1, 2, 3, 4, 5, 6, 7].map(corner))
+            }
+            Self::Hull(s) => longest(s.vertices()),
+            Self::Triangle(corners) => longest(corners),
+            Self::Points(points) => longest(points),
+        }
     }
 }
 
@@ -143,7 +172,7 @@ struct Corner {
 }
 
 /// Up to four corners and the weights that make the point closest to the origin.
-#[derive(Default)]
+#[derive(Clone, Copy, Default)]
 struct Simplex {
     corners: [Corner; 4],
     weights: [f64; 4],
@@ -169,19 +198,21 @@ pub(crate) fn closest(shape1: &Support, shape2: &Support, pose: &Pose) -> Option
         if simplex.count > 0 && (repeated || squared - v.dot(w) <= GAIN * squared) {
             break;
         }
+        let before = simplex;
         simplex.push(corner);
         if !simplex.reduce() {
             return None;
         }
-        v = simplex.point();
-        let squared = v.length_squared();
+        let nearer = simplex.point();
+        let squared = nearer.length_squared();
         if squared <= TOUCHING * TOUCHING * size {
             return None;
         }
         if squared >= shortest {
-            break; // Rounding: no closer any more.
+            simplex = before; // Rounding: no closer any more.
+            break;
         }
-        shortest = squared;
+        (v, shortest) = (nearer, squared);
     }
     let distance = v.length();
     let point1 = simplex.witness();
@@ -305,9 +336,11 @@ fn closest_on_tetrahedron(p: &[DVec3; 4]) -> Option<Feature> {
     let mut shortest = f64::MAX;
     for [a, b, c, opposite] in faces {
         let n = (p[b] - p[a]).cross(p[c] - p[a]);
-        let (inside, origin) = (n.dot(p[opposite] - p[a]), -n.dot(p[a]));
-        // The origin is beyond this face, or the tetrahedron is flat and all its faces count.
-        if inside == 0.0 || (inside > 0.0) != (origin > 0.0) {
+        let edge = p[opposite] - p[a];
+        let (inside, origin) = (n.dot(edge), -n.dot(p[a]));
+        // The origin is beyond this face, or the tetrahedron is flat but for rounding, and all its faces count.
+        let flat = inside * inside <= FLAT * FLAT * n.length_squared() * edge.length_squared();
+        if flat || (inside > 0.0) != (origin > 0.0) {
             let feature = closest_on_triangle(p, [a, b, c]);
             let squared = combine(p, &feature).length_squared();
             if squared < shortest {

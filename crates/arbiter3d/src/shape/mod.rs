@@ -7,6 +7,7 @@ mod capsule;
 mod cuboid;
 mod hull;
 mod hull_builder;
+mod hull_core;
 mod hull_features;
 mod hull_merge;
 mod mass;
