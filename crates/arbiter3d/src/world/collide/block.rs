@@ -414,6 +414,9 @@ impl CollideContext<'_> {
     /// Against what stands still, continuous collision does the looking ahead, unless something bounces: that has to leave from
     /// the surface. Contacts that are far apart would be hit one after the other, substep by substep, and a long body that
     /// hits so is thrown up by blows none of which bounces (measured: falling trunks of 25 m, by 1.4 m).
+    ///
+    /// Spin is left out of how fast they move: heaps of tumbling rocks would take 6 % more instructions for contacts that seldom
+    /// come to touch, and thin rods, whose size is their thickness, would see no farther.
     #[inline(always)]
     fn margin(&self, pair: &Pair) -> Real {
         if pair.sensor {
