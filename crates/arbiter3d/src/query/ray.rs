@@ -170,15 +170,9 @@ pub(crate) fn cast_sphere(radius: Real, ray: &Ray) -> Option<ShapeHit> {
     hit_at(fraction, point / point.length(), ray)
 }
 
-<<<<<<< HEAD
-/// The line first enters the infinite cylinder about y. Within the segment that is the hit. Past an end, everything that
-/// follows inside the cylinder reaches the capsule through the ball at that end, so the ball decides.
-pub(crate) fn cast_capsule(capsule: &Capsule, ray: &Ray) -> Option<ShapeHit> {
-=======
 /// The line first enters the infinite cylinder about y. Within the segment that is the hit. Past an end, everything
 /// that follows inside the cylinder reaches the capsule through the ball at that end, so the ball decides.
-fn cast_capsule(capsule: &Capsule, ray: &Ray) -> Option<ShapeHit> {
->>>>>>> queries
+pub(crate) fn cast_capsule(capsule: &Capsule, ray: &Ray) -> Option<ShapeHit> {
     let (radius, half_length) = (capsule.radius(), capsule.half_length());
     let (origin, direction) = (ray.origin, ray.direction);
     let on_axis = Vec3::new(0.0, crate::math::clamp(origin.y, -half_length, half_length), 0.0);
