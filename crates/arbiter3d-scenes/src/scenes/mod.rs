@@ -4,6 +4,7 @@ pub(crate) mod behaviour;
 pub(crate) mod character;
 pub(crate) mod colosseum;
 pub(crate) mod drums;
+pub(crate) mod fast;
 pub(crate) mod fields;
 pub(crate) mod fluids;
 pub(crate) mod piles;

@@ -19,6 +19,7 @@ mod geometry;
 mod half_space;
 mod hull;
 mod hull_builder;
+mod hull_core;
 mod hull_features;
 mod hull_merge;
 mod mass;

@@ -1,8 +1,8 @@
 //! Questions to the world: rays, casts of shapes, overlaps, distances, contacts.
 //!
-//! The broad phase finds the shapes whose boxes may matter, nearest first where there is such an order, and `query` asks each
-//! of them. Answers do not depend on the order of the trees: hits at the same fraction, or shapes at the same distance, come in
-//! the order of their ids. Nothing here changes the world, so any number of threads may ask at once.
+//! The broad phase finds the shapes whose boxes may matter, nearest first where there is such an order, and `query`
+//! asks each of them. Answers do not depend on the order of the trees: hits at the same fraction, or shapes at the same
+//! distance, come in the order of their ids. Nothing here changes the world, so any number of threads may ask at once.
 
 mod batch;
 mod casts;
