@@ -541,3 +541,57 @@ fn clutter_is_neither_entered_nor_a_trap() {
     }
     assert!(covered > 150.0, "only {covered} m");
 }
+
+/// Triangles of a rectangle of `cells` × `cells` from a corner along two edges; they face along `u × v`.
+fn rectangle(mesh: &mut (Vec<Vec3>, Vec<[u32; 3]>), corner: Vec3, [u, v]: [Vec3; 2], cells: u32) {
+    let first = mesh.0.len() as u32;
+    for i in 0..=cells {
+        for j in 0..=cells {
+            mesh.0.push(corner + (u * i as f32 + v * j as f32) / cells as f32);
+        }
+    }
+    for i in 0..cells {
+        for j in 0..cells {
+            let (a, b) = (first + i * (cells + 1) + j, first + (i + 1) * (cells + 1) + j);
+            mesh.1.extend([[a, b, a + 1], [b, b + 1, a + 1]]);
+        }
+    }
+}
+
+/// A room and its stairs in one mesh: walls and corners stop it, it slides along them, and the stairs are climbed.
+#[test]
+fn whole_rooms_may_be_one_mesh() {
+    let mut mesh = (Vec::new(), Vec::new());
+    let (x, y, z) = (Vec3::X, Vec3::Y, Vec3::Z);
+    let low = Vec3::new(-4.0, 0.0, -4.0);
+    rectangle(&mut mesh, low, [z * 8.0, x * 8.0], 11); // floor
+    rectangle(&mut mesh, low, [y * 3.0, z * 8.0], 5);
+    rectangle(&mut mesh, low, [x * 8.0, y * 3.0], 5);
+    rectangle(&mut mesh, -low + y * 0.0, [x * -8.0, y * 3.0], 5);
+    rectangle(&mut mesh, -low, [y * 3.0, z * -8.0], 5);
+    for step in 0..4 {
+        // Stairs of 1 m width and 0.3 m depth along the middle.
+        let (height, at) = (0.25 * step as f32, 0.3 * step as f32);
+        rectangle(&mut mesh, Vec3::new(at, height, -0.5), [z, y * 0.25], 2);
+        rectangle(&mut mesh, Vec3::new(at, height + 0.25, -0.5), [z, x * if step == 3 { 1.0 } else { 0.3 }], 2);
+    }
+    let mut world = World::default();
+    fixed(&mut world, Shape::mesh(mesh.0, mesh.1).unwrap(), Vec3::ZERO, Quat::IDENTITY);
+    let mut walk = Walk::new(world, Vec3::new(-2.0, 0.05, -2.0));
+    walk.walk(Vec3::ZERO, 0.3);
+    let edge = 4.0 - RADIUS;
+    // Into a corner, along the wall to the next, and so round.
+    for (way, corner) in [((-1.0, -0.7), (-1.0, -1.0)), ((-0.5, 1.0), (-1.0, 1.0)), ((1.0, 0.5), (1.0, 1.0))] {
+        for _ in 0..300 {
+            walk.step(Vec3::new(way.0, 0.0, way.1) * 3.0);
+            assert!(walk.deepest < SKIN, "{} m deep at {}", walk.deepest, walk.at());
+            assert!(walk.at().y.abs() < 0.005, "leaves the floor at {}", walk.at());
+        }
+        let expected = Vec3::new(corner.0 * edge, 0.0, corner.1 * edge);
+        assert!((walk.at() - expected).length() < 0.01, "{} instead of {expected}", walk.at());
+    }
+    walk.hero.set_position(Vec3::new(-1.5, 0.0, 0.0)).unwrap();
+    walk.walk(Vec3::X * 3.0, 1.15);
+    assert_near(walk.at().y, 1.0, 0.005, "height on the stairs");
+    assert!(walk.hero.is_on_ground() && walk.deepest < SKIN, "{} m deep at {}", walk.deepest, walk.at());
+}
