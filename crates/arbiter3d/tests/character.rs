@@ -507,8 +507,8 @@ fn bad_numbers_are_refused() {
     assert!(velocity(&world, BodyId::WORLD) == Vec3::ZERO && !hero.is_on_ground());
 }
 
-/// Among 300 random boxes, ramps and balls, walking about and jumping: nothing is entered deeper than the skin, and it never
-/// stays caught for good.
+/// Among 300 random boxes, ramps and balls, walking about and jumping: nothing is entered deeper than the skin, and it
+/// never stays caught for good.
 #[test]
 fn clutter_is_neither_entered_nor_a_trap() {
     let mut random = common::Random(5);

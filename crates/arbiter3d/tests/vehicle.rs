@@ -167,7 +167,8 @@ fn slow_cars_turn_about_the_centre_of_their_wheels() {
     }
 }
 
-/// Parked on 10° with the handbrake for ten seconds, a car stays within a millimetre; without it, it rolls at g sin 10°.
+/// Parked on 10° with the handbrake for ten seconds, a car stays within a millimetre; without it, it rolls at g sin
+/// 10°.
 #[test]
 fn the_handbrake_holds_on_a_slope() {
     let parked = |handbrake: f32| {

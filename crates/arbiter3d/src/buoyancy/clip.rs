@@ -1,8 +1,9 @@
 //! The part of a closed surface of triangles behind some planes: its volume, centroid and areas.
 //!
-//! Each plane cuts off what is in front of it, triangle by triangle. The cuts of the triangles are the edges of the hole;
-//! as they run against the direction of the surface, one triangle from a common corner to each edge closes it, in whatever
-//! order the edges come. The result is closed again, so the next plane may follow, and the divergence theorem gives
+//! Each plane cuts off what is in front of it, triangle by triangle. The cuts of the triangles are the edges of the
+//! hole; as they run against the direction of the surface, one triangle from a common corner to each edge closes it, in
+//! whatever order the edges come. The result is closed again, so the next plane may follow, and the divergence theorem
+//! gives
 //!
 //! ```text
 //! V = Σ a·(b × c) / 6        V x = Σ (a + b + c)/4 · a·(b × c) / 6
@@ -107,8 +108,8 @@ impl Clipper {
         0.25 * doubled
     }
 
-    /// Points with areas that stand for the face of the last cut: integrals of squares over it are exact, as the middles of
-    /// the edges of a triangle, each with a third of its area, give them.
+    /// Points with areas that stand for the face of the last cut: integrals of squares over it are exact, as the
+    /// middles of the edges of a triangle, each with a third of its area, give them.
     pub fn face_points(&self, normal: Vec3) -> impl Iterator<Item = (Vec3, Real)> + '_ {
         self.face.iter().flat_map(move |&[a, b, c]| {
             let third = (b - a).cross(c - a).dot(normal) * (1.0 / 6.0);
@@ -151,8 +152,8 @@ mod tests {
         assert!((cut.shadow(Vec3::Y) - 12.0).abs() < 1e-4 && (cut.shadow(Vec3::X) - 6.0).abs() < 1e-4);
     }
 
-    /// The plane through three corners of a cube cuts off a corner of a sixth of its volume; three planes of an octant leave
-    /// an eighth.
+    /// The plane through three corners of a cube cuts off a corner of a sixth of its volume; three planes of an octant
+    /// leave an eighth.
     #[test]
     fn skew_and_repeated_cuts_are_exact() {
         let cube = Shape::cuboid(Vec3::splat(0.5)).unwrap();

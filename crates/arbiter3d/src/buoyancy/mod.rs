@@ -7,9 +7,9 @@
 //! - by drag: against its motion through the fluid with `ρ V k u + ½ ρ C A |u| u` at the same point, where `A` is the
 //!   shadow of the part along the motion, and against its spin.
 //!
-//! Drag is taken at the velocity after the step, so that it never reverses a motion however light the body; and where the
-//! surface cuts a shape, so is the change of what is displaced, `ρ g dA` per way at each point of the cut: balloons and
-//! shells, whose bobbing is quicker than a step, come to rest instead of jittering.
+//! Drag is taken at the velocity after the step, so that it never reverses a motion however light the body; and where
+//! the surface cuts a shape, so is the change of what is displaced, `ρ g dA` per way at each point of the cut: balloons
+//! and shells, whose bobbing is quicker than a step, come to rest instead of jittering.
 //!
 //! Waves are taken as a plane below each shape: through the mean of the heights at its middle and at four points of its
 //! rim, with their mean slope. Shapes of one body that overlap count twice where they do.
@@ -39,7 +39,8 @@ use std::sync::Arc;
 pub enum FluidSurface {
     /// A plane; the fluid is behind it.
     Plane(Plane),
-    /// The height (y) of the surface above or below a point (x, z). For waves that move, set a new one before each step.
+    /// The height (y) of the surface above or below a point (x, z). For waves that move, set a new one before each
+    /// step.
     Height(Arc<dyn Fn(Vec3) -> Real + Send + Sync>),
 }
 
@@ -87,7 +88,8 @@ impl std::fmt::Debug for FluidSurface {
 pub struct FluidDefinition {
     /// Its top. Default level at y = 0.
     pub surface: FluidSurface,
-    /// Planes behind which the fluid lies, besides the surface: walls and bottom of any convex region. Default none, an ocean.
+    /// Planes behind which the fluid lies, besides the surface: walls and bottom of any convex region. Default none, an
+    /// ocean.
     pub bounds: Vec<Plane>,
     /// Mass per volume, kg/m³ (0 to 10⁶). Default 1000, water.
     pub density: Real,
@@ -96,8 +98,8 @@ pub struct FluidDefinition {
     /// Drag that grows with speed, 1/s (0 to 10⁴): the rate at which a body that displaces its own mass loses speed.
     /// Default 0.1.
     pub linear_drag: Real,
-    /// Drag that grows with the square of speed: the coefficient `C` on the shadow of the body (0 to 10⁴). Default 0.5, a
-    /// ball; a box has about 1.
+    /// Drag that grows with the square of speed: the coefficient `C` on the shadow of the body (0 to 10⁴). Default 0.5,
+    /// a ball; a box has about 1.
     pub quadratic_drag: Real,
     /// Drag against spin, 1/s (0 to 10⁴): the rate at which a body that displaces its own mass loses spin. Default 0.5.
     pub angular_drag: Real,
@@ -286,8 +288,8 @@ impl FluidVolume {
         Ok(if volume > 0.0 { Submersion { volume, center: moment / volume } } else { Submersion::default() })
     }
 
-    /// Pushes the awake dynamic bodies that are in the fluid, for the coming step of `dt` seconds. What sleeps floats on as it
-    /// is; a change of the fluid wakes it.
+    /// Pushes the awake dynamic bodies that are in the fluid, for the coming step of `dt` seconds. What sleeps floats
+    /// on as it is; a change of the fluid wakes it.
     ///
     /// # Errors
     /// If `dt` is not above 0 and at most 1, or a height or force is not finite.

@@ -1,7 +1,7 @@
 //! Closed surfaces of triangles for shapes of every kind.
 //!
-//! Boxes and hulls give their faces. A round shape gives the triangles through points of its surface, moved and grown so
-//! that volume and centroid are those of the shape: what floats displaces its exact volume, and only the shape of
+//! Boxes and hulls give their faces. A round shape gives the triangles through points of its surface, moved and grown
+//! so that volume and centroid are those of the shape: what floats displaces its exact volume, and only the shape of
 //! the water line is that of a polyhedron (within 0.4 % of the radius).
 
 use super::clip::{Clipper, Triangle};

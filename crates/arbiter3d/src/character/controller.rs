@@ -4,14 +4,16 @@
 //!
 //! 1. *Recover*: out of what has come too close since the last update, as kinematic walls do.
 //! 2. *Probe*: what is below, how it moves, whether one can stand on it.
-//! 3. *Steer*: the velocity against the ground goes towards the wanted one; in the air gravity counts, and less steering.
-//! 4. *Walk* along the ground: slide; where something blocks, try to step over it; then sink to the ground again, which is
-//!    how stairs are walked down. Or *fly*: slide along half old, half new velocity, and lose what points into obstacles.
+//! 3. *Steer*: the velocity against the ground goes towards the wanted one; in the air gravity counts, and less
+//!    steering.
+//! 4. *Walk* along the ground: slide; where something blocks, try to step over it; then sink to the ground again, which
+//!    is how stairs are walked down. Or *fly*: slide along half old, half new velocity, and lose what points into
+//!    obstacles.
 //! 5. *Carry*: move as the ground will in the coming step, its turning included.
 //! 6. *Push* dynamic bodies in the way with a force up to `push_force`; press on those below with the weight.
 //!
-//! Small errors of the height (below a twentieth of the skin) are left alone, so a character at rest has a vertical speed of
-//! exactly zero. Call [`CharacterController::update`] before each [`World::step`] with the same `dt`.
+//! Small errors of the height (below a twentieth of the skin) are left alone, so a character at rest has a vertical
+//! speed of exactly zero. Call [`CharacterController::update`] before each [`World::step`] with the same `dt`.
 
 use super::mover::{ContactPlane, Ground, ShapeMover};
 use super::planes::{PlaneLimit, solve_planes};
@@ -33,8 +35,8 @@ pub struct CharacterSettings {
     pub radius: Real,
     /// Height of the capsule, metres; more than twice the radius. Default 1.8.
     pub height: Real,
-    /// Depth of the outermost layer of the capsule that is kept free of overlap, metres; above 0 and less than half the radius.
-    /// Default 0.02.
+    /// Depth of the outermost layer of the capsule that is kept free of overlap, metres; above 0 and less than half the
+    /// radius. Default 0.02.
     pub skin: Real,
     /// Unit vector up. Default +y.
     pub up: Vec3,
@@ -97,8 +99,8 @@ impl CharacterSettings {
 
 /// A walking capsule.
 ///
-/// It has no body: the world does not feel it but by its pushes and its weight. Give it a kinematic body of your own, left out by
-/// `filter`, if others shall bump into it.
+/// It has no body: the world does not feel it but by its pushes and its weight. Give it a kinematic body of your own,
+/// left out by `filter`, if others shall bump into it.
 ///
 /// ```
 /// use arbiter3d::{BodyId, CharacterController, CharacterSettings, Shape, ShapeDefinition, World, math::Vec3};
@@ -238,7 +240,8 @@ impl CharacterController {
         (2.0 * self.settings.gravity * max(height, 0.0)).sqrt()
     }
 
-    /// Moves for a step of `dt` seconds, with the `wanted` velocity against the ground (m/s; its part along `up` does not count).
+    /// Moves for a step of `dt` seconds, with the `wanted` velocity against the ground (m/s; its part along `up` does
+    /// not count).
     ///
     /// # Errors
     /// If a number is not finite, or `dt` is not above 0 and at most 1.
@@ -380,8 +383,8 @@ impl CharacterController {
         self.find_ground(world)
     }
 
-    /// A change of the level velocity without what points into walls and steep slopes: else leaning against a slope would
-    /// slow the slide down on it.
+    /// A change of the level velocity without what points into walls and steep slopes: else leaning against a slope
+    /// would slow the slide down on it.
     fn change_beside_walls(&self, world: &World, change: Vec3) -> Result<Vec3, Error> {
         let mover = self.mover(&self.settings.filter);
         let mut planes = Vec::new();

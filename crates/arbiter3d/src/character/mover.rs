@@ -1,13 +1,13 @@
 //! A shape that is moved through the world by hand: what is around it, how far it comes, what it stands on.
 //!
-//! The shape keeps a *skin* free between itself and everything else, so that it moves along surfaces without rubbing on them
-//! and small errors never make it overlap. All functions are pure questions to the world; none keeps anything.
+//! The shape keeps a *skin* free between itself and everything else, so that it moves along surfaces without rubbing on
+//! them and small errors never make it overlap. All functions are pure questions to the world; none keeps anything.
 //!
 //! - [`ShapeMover::collect_planes`]: the planes that limit it here, one a contact point.
-//! - [`ShapeMover::slide`]: rounds of *collect, solve, cast*. The way to the target is bent to respect all planes nearby
-//!   (`planes.rs`), and cast; where the cast meets something new, the mover stops a skin before it, and the next round knows
-//!   that plane too. A slope too steep to walk on counts as a wall besides: the mover slides down on it, but no push from the
-//!   side brings it up.
+//! - [`ShapeMover::slide`]: rounds of *collect, solve, cast*. The way to the target is bent to respect all planes
+//!   nearby (`planes.rs`), and cast; where the cast meets something new, the mover stops a skin before it, and the next
+//!   round knows that plane too. A slope too steep to walk on counts as a wall besides: the mover slides down on it,
+//!   but no push from the side brings it up.
 //! - [`ShapeMover::recover`]: the shortest way out of what has come too close.
 //! - [`ShapeMover::probe_ground`]: what is below, and whether one can stand on it.
 //! - [`ShapeMover::step_up`]: up, ahead and down on something higher.
@@ -250,9 +250,9 @@ impl<'a> ShapeMover<'a> {
         Ok((direction * max(free, 0.0), Some(CastHit { fraction, ..hit })))
     }
 
-    /// The shortest displacement that frees the shape of what is closer than its skin, and whether there is one: caught between
-    /// walls that close in, there is none, and the displacement is a compromise. Gaps that miss less than a twentieth of the
-    /// skin are left as they are, so that nothing trembles.
+    /// The shortest displacement that frees the shape of what is closer than its skin, and whether there is one: caught
+    /// between walls that close in, there is none, and the displacement is a compromise. Gaps that miss less than a
+    /// twentieth of the skin are left as they are, so that nothing trembles.
     ///
     /// # Errors
     /// If a number is not finite or out of its range.
@@ -335,17 +335,17 @@ impl<'a> ShapeMover<'a> {
         })
     }
 
-    /// Whether straight below the middle is a surface to walk on, no farther than `reach` below the foot, and half as much more:
-    /// on stairs whose treads are shorter than its radius a capsule hangs between two edges, higher than the tread by more
-    /// than a step.
+    /// Whether straight below the middle is a surface to walk on, no farther than `reach` below the foot, and half as
+    /// much more: on stairs whose treads are shorter than its radius a capsule hangs between two edges, higher than the
+    /// tread by more than a step.
     fn stands_over(&self, world: &World, position: Vec3, reach: Real) -> Result<bool, Error> {
         let down = self.up * -(self.depth_of_foot() + self.skin + 1.5 * reach);
         let hit = world.cast_ray(position, down, 1.0, &self.filter)?;
         Ok(hit.is_some_and(|hit| hit.normal.dot(self.up) >= self.walkable_cosine))
     }
 
-    /// Tries to go by a level `displacement` over something up to `height` (metres) high: up, ahead, and down on it. Gives the
-    /// new position if what is there can be walked on; the way up ends at ceilings.
+    /// Tries to go by a level `displacement` over something up to `height` (metres) high: up, ahead, and down on it.
+    /// Gives the new position if what is there can be walked on; the way up ends at ceilings.
     ///
     /// # Errors
     /// If a number is not finite or out of its range.
@@ -371,7 +371,8 @@ impl<'a> ShapeMover<'a> {
         let slant = min(1.0 / max(hit.normal.dot(self.up), 1e-3), SLANT);
         let landing = ahead - self.up * max(hit.fraction * length - self.skin * slant, 0.0);
         let landing = self.raised(world, landing)?;
-        // One must come to stand on it, not only against its edge: it is no higher than a step, and there is room above.
+        // One must come to stand on it, not only against its edge: it is no higher than a step, and there is room
+        // above.
         let highest = (position - self.up * (self.depth_of_foot() + self.skin)).dot(self.up) + min(height, room);
         let ahead = normalize_or(displacement, Vec3::ZERO);
         let mut planes = Vec::new();
@@ -386,8 +387,8 @@ impl<'a> ShapeMover<'a> {
         Ok(None)
     }
 
-    /// A position raised until nothing below is closer than the skin: a cast down keeps it to what it meets first only, and
-    /// to be pushed out sideways from the next edge would cost the way just made.
+    /// A position raised until nothing below is closer than the skin: a cast down keeps it to what it meets first only,
+    /// and to be pushed out sideways from the next edge would cost the way just made.
     pub(super) fn raised(&self, world: &World, position: Vec3) -> Result<Vec3, Error> {
         let mut planes = Vec::new();
         self.collect_planes(world, position, self.skin, &mut planes)?;

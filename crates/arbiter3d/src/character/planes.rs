@@ -1,18 +1,19 @@
 //! The vector closest to a wanted one that respects some planes.
 //!
-//! Each limit asks that `n · x ≥ least`. The closest such `x` to the wanted `d` is unique; it is `d` itself, or lies on one
-//! limit, on the line of two, or in the corner of three, with multipliers `λ ≥ 0` in
+//! Each limit asks that `n · x ≥ least`. The closest such `x` to the wanted `d` is unique; it is `d` itself, or lies on
+//! one limit, on the line of two, or in the corner of three, with multipliers `λ ≥ 0` in
 //!
 //! ```text
 //! x = d + Σ λᵢ nᵢ        nᵢ · x = leastᵢ for the limits taken        n · x ≥ least for all
 //! ```
 //!
-//! (the conditions of Karush, Kuhn and Tucker). With at most sixteen limits, all sets of up to three are tried in `f64`:
-//! no iteration that stops early, no order of planes that matters, no violation beyond rounding. A mover that slides by this
-//! neither climbs out of acute corners nor trembles in them, as one that projects on one plane after the other does.
+//! (the conditions of Karush, Kuhn and Tucker). With at most sixteen limits, all sets of up to three are tried in
+//! `f64`: no iteration that stops early, no order of planes that matters, no violation beyond rounding. A mover that
+//! slides by this neither climbs out of acute corners nor trembles in them, as one that projects on one plane after the
+//! other does.
 //!
-//! Limits may contradict each other, as when walls close in on a mover. Then no `x` is right, and the result is a compromise
-//! that shares the violation, marked as such.
+//! Limits may contradict each other, as when walls close in on a mover. Then no `x` is right, and the result is a
+//! compromise that shares the violation, marked as such.
 
 use crate::math::{Real, Vec3};
 use glam::DVec3;
@@ -33,8 +34,8 @@ const SAME: Real = 0.99999;
 pub struct PlaneLimit {
     /// Unit normal of the plane.
     pub normal: Vec3,
-    /// The vector's least component along it: negative where there is room before the plane, positive where the mover must
-    /// be pushed out of it.
+    /// The vector's least component along it: negative where there is room before the plane, positive where the mover
+    /// must be pushed out of it.
     pub least: Real,
 }
 

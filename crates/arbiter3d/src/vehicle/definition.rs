@@ -6,8 +6,8 @@ use crate::world::{CombineRule, QueryFilter};
 
 /// A spring with a damper between the chassis and a wheel.
 ///
-/// The stiffness is `m (2π f)²` and the damping `2 ζ m (2π f)`, where `m` is the mass of the chassis divided by the number
-/// of its wheels. A car at rest therefore sinks by about `g / (2π f)²`: 9 cm at the default frequency.
+/// The stiffness is `m (2π f)²` and the damping `2 ζ m (2π f)`, where `m` is the mass of the chassis divided by the
+/// number of its wheels. A car at rest therefore sinks by about `g / (2π f)²`: 9 cm at the default frequency.
 ///
 /// ```
 /// use arbiter3d::Suspension;
@@ -18,11 +18,11 @@ pub struct Suspension {
     /// Distance from the attachment to the centre of the wheel when the spring carries nothing, metres (0 to 10³).
     /// Default 0.35.
     pub rest_length: Real,
-    /// How far the wheel can rise from there before it meets the bump stop, metres; above 0 and at most 10³. The stop is a
-    /// spring 20 times as stiff. Default 0.25.
+    /// How far the wheel can rise from there before it meets the bump stop, metres; above 0 and at most 10³. The stop
+    /// is a spring 20 times as stiff. Default 0.25.
     pub travel: Real,
-    /// Frequency of the undamped spring under its share of the chassis, Hz (above 0, at most 100): 1 to 1.5 is soft, 3 is
-    /// stiff. Default 1.7.
+    /// Frequency of the undamped spring under its share of the chassis, Hz (above 0, at most 100): 1 to 1.5 is soft, 3
+    /// is stiff. Default 1.7.
     pub frequency: Real,
     /// Damping ratio, 0 to 10; 1 does not swing back. Default 0.5.
     pub damping_ratio: Real,
@@ -38,9 +38,9 @@ impl Default for Suspension {
 
 /// How a tyre grips: the force over the slip, and how much there is of it.
 ///
-/// Slip along the wheel is the slip speed as a share of the speed (of the ground or of the tread, whichever is faster), slip
-/// across it the tangent of the slip angle. Divided by its peak value, the force rises in proportion up to 1, then falls in
-/// proportion to `sliding_grip` at `sliding_slip`, and stays there. Both directions share one friction circle.
+/// Slip along the wheel is the slip speed as a share of the speed (of the ground or of the tread, whichever is faster),
+/// slip across it the tangent of the slip angle. Divided by its peak value, the force rises in proportion up to 1, then
+/// falls in proportion to `sliding_grip` at `sliding_slip`, and stays there. Both directions share one friction circle.
 /// At a standstill the tyre sticks.
 ///
 /// ```
@@ -51,8 +51,8 @@ impl Default for Suspension {
 pub struct Tyre {
     /// Largest force as a share of the load, 0 or more. Default 1.
     pub friction: Real,
-    /// How it is combined with the friction of the ground. Default the maximum, so that the tyre decides unless the ground's
-    /// material has a stricter rule: let ice combine by [`CombineRule::Minimum`].
+    /// How it is combined with the friction of the ground. Default the maximum, so that the tyre decides unless the
+    /// ground's material has a stricter rule: let ice combine by [`CombineRule::Minimum`].
     pub friction_combine: CombineRule,
     /// Slip along the wheel at which the force is largest, 0.001 to 10. Default 0.1.
     pub longitudinal_peak: Real,
@@ -219,8 +219,9 @@ impl Default for VehicleDefinition {
 }
 
 impl VehicleDefinition {
-    /// A car that looks along −z: front left, front right, rear left, rear right. The front is steered, the rear driven and
-    /// held by the handbrake. Wheels are `half_track` to the side, `half_base` ahead or behind, attached at `height`.
+    /// A car that looks along −z: front left, front right, rear left, rear right. The front is steered, the rear driven
+    /// and held by the handbrake. Wheels are `half_track` to the side, `half_base` ahead or behind, attached at
+    /// `height`.
     #[must_use]
     pub fn car(half_track: Real, half_base: Real, height: Real) -> Self {
         let wheel = |x: Real, z: Real| WheelDefinition::at(Vec3::new(x, height, z));
@@ -262,9 +263,9 @@ pub struct VehicleControls {
     pub brake: Real,
     /// Share of the handbrake torque, 0 to 1. Default 0.
     pub handbrake: Real,
-    /// Angle of the steered wheels, radians, −1.3 to 1.3; positive to the left. The wheels of an axle are turned each by its
-    /// own angle, so that all point along circles about one centre on the line of the wheels that are not steered
-    /// (Ackermann). Default 0.
+    /// Angle of the steered wheels, radians, −1.3 to 1.3; positive to the left. The wheels of an axle are turned each
+    /// by its own angle, so that all point along circles about one centre on the line of the wheels that are not
+    /// steered (Ackermann). Default 0.
     pub steering: Real,
 }
 

@@ -1,20 +1,21 @@
 //! Vehicles whose wheels are rays.
 //!
-//! A wheel has no body and no shape: each step a ray looks for the ground along its suspension. Where it finds some, the
-//! wheel adds three rows to a small system of its own,
+//! A wheel has no body and no shape: each step a ray looks for the ground along its suspension. Where it finds some,
+//! the wheel adds three rows to a small system of its own,
 //!
 //! - the *strut*, a spring and damper along the suspension that can only push,
 //! - the *tyre* along and across the wheel, whose force grows with slip and ends at a friction circle,
 //!
-//! and one more degree of freedom, the spin of the wheel, which engine, brake and tyre turn. `solve.rs` solves the system
-//! for the velocity at the end of the step, so that stiff springs, locked wheels and light wheels on heavy cars are stable
-//! at any step, a car at rest stays where it is, and all of its wheels know of each other. What comes out is given to the
-//! bodies as forces over the coming step: to the chassis, and the opposite to a ground that can move.
+//! and one more degree of freedom, the spin of the wheel, which engine, brake and tyre turn. `solve.rs` solves the
+//! system for the velocity at the end of the step, so that stiff springs, locked wheels and light wheels on heavy cars
+//! are stable at any step, a car at rest stays where it is, and all of its wheels know of each other. What comes out is
+//! given to the bodies as forces over the coming step: to the chassis, and the opposite to a ground that can move.
 //!
 //! Call [`Vehicle::update`] before each [`World::step`] with the same `dt`.
 //!
-//! Invariants: the forces of a wheel lie in the friction cone of its load; what the chassis gets and what the ground gets
-//! cancel; a vehicle that rests on what rests falls asleep like any body, and is woken by its controls or a change of ground.
+//! Invariants: the forces of a wheel lie in the friction cone of its load; what the chassis gets and what the ground
+//! gets cancel; a vehicle that rests on what rests falls asleep like any body, and is woken by its controls or a change
+//! of ground.
 
 mod definition;
 mod solve;
@@ -65,8 +66,8 @@ impl Vehicle {
     /// A vehicle on the body `chassis`.
     ///
     /// # Errors
-    /// If the body is unknown or not dynamic, a number of the definition is out of its range, or an anti-roll bar names a
-    /// wheel that is not there.
+    /// If the body is unknown or not dynamic, a number of the definition is out of its range, or an anti-roll bar names
+    /// a wheel that is not there.
     pub fn new(world: &World, chassis: BodyId, definition: &VehicleDefinition) -> Result<Self, Error> {
         definition.validate()?;
         let body = world.body(chassis).ok_or(Error::UnknownBody { id: chassis })?;
@@ -114,8 +115,8 @@ impl Vehicle {
         Ok(())
     }
 
-    /// Sets a torque on one wheel, N m, that comes on top of its share of the engine's: electric motors, a differential, tank
-    /// steering. It stays until it is set again.
+    /// Sets a torque on one wheel, N m, that comes on top of its share of the engine's: electric motors, a
+    /// differential, tank steering. It stays until it is set again.
     ///
     /// # Errors
     /// If the torque is not finite or there is no such wheel.
@@ -134,8 +135,8 @@ impl Vehicle {
         self.wheels.get(wheel).map(|wheel| &wheel.state)
     }
 
-    /// Where to draw a wheel seen from the chassis: its centre, and its frame with the axle along the vehicle's left and right,
-    /// steered and turned as it is.
+    /// Where to draw a wheel seen from the chassis: its centre, and its frame with the axle along the vehicle's left
+    /// and right, steered and turned as it is.
     #[must_use]
     pub fn wheel_pose(&self, wheel: usize) -> Option<Pose> {
         let wheel = self.wheels.get(wheel)?;

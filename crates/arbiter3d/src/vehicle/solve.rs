@@ -1,21 +1,22 @@
 //! The forces of all wheels of a vehicle, found together for the velocity at the end of the step.
 //!
-//! Unknown are the impulses of each wheel over the step: `λn` along its strut, `λf` and `λl` of its tyre ahead and to the
-//! left, `b` of its brake. With `u' = u + K λ` the velocity of a row after the step,
+//! Unknown are the impulses of each wheel over the step: `λn` along its strut, `λf` and `λl` of its tyre ahead and to
+//! the left, `b` of its brake. With `u' = u + K λ` the velocity of a row after the step,
 //!
-//! - strut: `λn = dt k (x − u' dt) − dt c u'`, at least 0: a spring compressed by `x` and a damper, taken implicitly. The
-//!   bump stop adds its stiffness past the travel, an anti-roll bar the difference of two compressions.
-//! - tyre: `λ = −u' / e` with `e = s_peak V / (μ N dt)`, a force in proportion to slip `u / V` that reaches `μ N` at the
-//!   peak. At a standstill `e` is zero and the tyre sticks. `(λf, λl)` stays within the circle `μ N g(s)`.
-//! - spin: `I ω' = I ω + dt T − r λf + b` with `|b|` up to the brake's. Wheel, tyre and brake are solved as a block: a light
-//!   wheel between a heavy car and a firm brake converges in one go, where rows of their own would need hundreds of sweeps.
+//! - strut: `λn = dt k (x − u' dt) − dt c u'`, at least 0: a spring compressed by `x` and a damper, taken implicitly.
+//!   The bump stop adds its stiffness past the travel, an anti-roll bar the difference of two compressions.
+//! - tyre: `λ = −u' / e` with `e = s_peak V / (μ N dt)`, a force in proportion to slip `u / V` that reaches `μ N` at
+//!   the peak. At a standstill `e` is zero and the tyre sticks. `(λf, λl)` stays within the circle `μ N g(s)`.
+//! - spin: `I ω' = I ω + dt T − r λf + b` with `|b|` up to the brake's. Wheel, tyre and brake are solved as a block: a
+//!   light wheel between a heavy car and a firm brake converges in one go, where rows of their own would need hundreds
+//!   of sweeps.
 //!
-//! Rows of different wheels are coupled through the chassis by Gauss–Seidel sweeps, alternately forwards and backwards, so
-//! that left and right are treated alike. The prediction starts from gravity and the forces already gathered, so a car at
-//! rest gets what carries it and does not move at all.
+//! Rows of different wheels are coupled through the chassis by Gauss–Seidel sweeps, alternately forwards and backwards,
+//! so that left and right are treated alike. The prediction starts from gravity and the forces already gathered, so a
+//! car at rest gets what carries it and does not move at all.
 //!
-//! The ground is taken at its present speed. Where it can move, its mass softens tyre and damper, so that a light plate is
-//! not shot away; it does not soften the spring, whose load at rest is exact on whatever ground.
+//! The ground is taken at its present speed. Where it can move, its mass softens tyre and damper, so that a light plate
+//! is not shot away; it does not soften the spring, whose load at rest is exact on whatever ground.
 
 use super::definition::{VehicleControls, VehicleDefinition};
 use super::wheel::{Wheel, WheelContact};
@@ -112,6 +113,31 @@ struct Row {
     slip: [Real; 2],
 }
 
+/// A spring and damper taken implicitly over a step.
+struct Strut {
+    compression: Real,
+    push: Real,
+    resistance: Real,
+}
+
+impl Strut {
+    /// The strut of a wheel that carries `mass`, on ground that gives way by `response`.
+    fn new(wheel: &Wheel, mass: Real, response: Real, dt: Real) -> Self {
+        let suspension = &wheel.definition.suspension;
+        let rate = std::f32::consts::TAU * suspension.frequency;
+        let (spring, damper) = (mass * rate * rate, 2.0 * suspension.damping_ratio * mass * rate);
+        let compression = suspension.rest_length - wheel.state.suspension_length;
+        let past = max(compression - suspension.travel, 0.0);
+        let stop = if past > 0.0 { STOP_STIFFNESS * spring } else { 0.0 };
+        let resistance = dt * (damper + (spring + stop) * dt);
+        Self {
+            compression,
+            push: dt * (spring * compression + stop * past),
+            resistance: resistance / (1.0 + resistance * response),
+        }
+    }
+}
+
 /// The rows of a vehicle, kept so that updates allocate nothing.
 #[derive(Clone, Debug, Default)]
 pub(super) struct System {
@@ -200,16 +226,8 @@ impl System {
         let forward = normalize_or(ahead - normal * normal.dot(ahead), ahead);
         let left = normal.cross(forward);
 
-        let suspension = &wheel.definition.suspension;
-        let rate = std::f32::consts::TAU * suspension.frequency;
         let mass = body.mass() / definition.wheels.len() as Real;
-        let (spring, damper) = (mass * rate * rate, 2.0 * suspension.damping_ratio * mass * rate);
-        let compression = suspension.rest_length - wheel.state.suspension_length;
-        let past = max(compression - suspension.travel, 0.0);
-        let stop = if past > 0.0 { STOP_STIFFNESS * spring } else { 0.0 };
-        let resistance = dt * (damper + (spring + stop) * dt);
-        let resistance = resistance / (1.0 + resistance * self.grounds[ground].response(point, axis));
-
+        let strut = Strut::new(wheel, mass, self.grounds[ground].response(point, axis), dt);
         let velocity = chassis.velocity_at(point) - self.grounds[ground].velocity_at(point);
         let tyre = &wheel.definition.tyre;
         let radius = wheel.definition.radius;
@@ -228,11 +246,11 @@ impl System {
             cosine,
             forward,
             left,
-            compression,
-            push: dt * (spring * compression + stop * past),
-            resistance,
+            compression: strut.compression,
+            push: strut.push,
+            resistance: strut.resistance,
             strut_response: chassis.response(point, axis),
-            strut_limit: suspension.max_force * dt,
+            strut_limit: wheel.definition.suspension.max_force * dt,
             strut: contact.load * cosine * dt,
             forward_response: both(forward),
             left_response: both(left),
