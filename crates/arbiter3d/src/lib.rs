@@ -44,8 +44,8 @@ mod world;
 pub use arbiter::{Arbiter, ArbiterId, ArbiterKey, Contact, ContactData, ContactPoint, EndReason, SolveMode};
 pub use query::{Ray, ShapeHit, cast_ray};
 pub use shape::{
-    Capsule, Cone, ConvexHull, ConvexShape, Cuboid, Custom, Cylinder, HalfEdge, HalfSpace, MassProperties, MeshRayHit,
-    MeshSides, Plane, PointCloud, Rounded, Shape, ShapeError, Sphere, TaperedCapsule, Transformed, Triangle,
+    Capsule, Cone, ConvexHull, ConvexShape, Cuboid, Custom, Cylinder, FieldDiagonals, FieldSide, HalfEdge, HalfSpace,
+    HeightField, MassProperties, MeshRayHit, MeshSides, Plane, PointCloud, Rounded, Shape, ShapeError, Sphere, TaperedCapsule, Transformed, Triangle,
     TriangleMesh,
 };
 pub use simd::{SimdLevel, UnknownSimdLevel};

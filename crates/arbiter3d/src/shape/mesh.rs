@@ -48,7 +48,7 @@ impl Facet {
     pub(crate) const NONE: Self = Self { quads: [[0.0; 4]; 3] };
 
     #[inline(always)]
-    fn new([a, b, c]: [Vec3; 3], normal: Vec3) -> Self {
+    pub(super) fn new([a, b, c]: [Vec3; 3], normal: Vec3) -> Self {
         Self { quads: [[a.x, a.y, a.z, b.x], [b.y, b.z, c.x, c.y], [c.z, normal.x, normal.y, normal.z]] }
     }
 
@@ -84,6 +84,8 @@ pub struct TriangleMesh {
     tree: MeshTree,
     /// In the order of the tree.
     surroundings: Vec<Surroundings>,
+    /// Of each of the user's triangles; empty if all are zero.
+    materials: Vec<u8>,
 }
 
 impl TriangleMesh {
@@ -157,7 +159,27 @@ impl TriangleMesh {
         vertices.push(Vec3::ZERO);
         vertices.shrink_to_fit();
         triangles.shrink_to_fit();
-        Self { vertices, triangles, sides, tree, surroundings }
+        Self { vertices, triangles, sides, tree, surroundings, materials: Vec::new() }
+    }
+
+    /// The same with materials: for each triangle as given which of
+    /// [`ShapeDefinition::palette`](crate::ShapeDefinition::palette).
+    ///
+    /// # Errors
+    /// If there are not as many as triangles.
+    pub fn with_materials(mut self, materials: Vec<u8>) -> Result<Self, ShapeError> {
+        let (given, expected) = (materials.len(), self.triangles.len());
+        if given != expected {
+            return Err(ShapeError::WrongCount { what: "materials", given, expected });
+        }
+        self.materials = materials;
+        Ok(self)
+    }
+
+    /// The materials of the triangles as given; empty if all are zero.
+    #[must_use]
+    pub fn materials(&self) -> &[u8] {
+        &self.materials
     }
 
     /// Corner positions, metres.
@@ -241,8 +263,7 @@ impl TriangleMesh {
     #[inline(always)]
     pub(crate) fn facet(&self, index: usize) -> Facet {
         let corners = self.corners(index);
-        let cross = cross_of(&corners);
-        Facet::new(corners, (cross * (1.0 / cross.length())).as_vec3())
+        Facet::new(corners, unit_normal(&corners))
     }
 
     /// The triangles of a leaf side by side; lanes past the last hold that one again.
@@ -291,6 +312,11 @@ impl TriangleMesh {
     #[inline(always)]
     pub(crate) fn surroundings(&self, index: usize) -> &Surroundings {
         &self.surroundings[index]
+    }
+
+    #[inline(always)]
+    pub(crate) fn material(&self, index: usize) -> u8 {
+        if self.materials.is_empty() { 0 } else { self.materials[self.surroundings[index].id as usize] }
     }
 
     /// Calls `visit` with the far ends of all edges that meet in a corner, some of them twice, until it returns false.
@@ -362,6 +388,13 @@ fn cross_of([a, b, c]: &[Vec3; 3]) -> DVec3 {
     (b.as_dvec3() - a).cross(c.as_dvec3() - a)
 }
 
+/// Unit normal of a triangle that has an area.
+#[inline(always)]
+pub(super) fn unit_normal(corners: &[Vec3; 3]) -> Vec3 {
+    let cross = cross_of(corners);
+    (cross * (1.0 / cross.length())).as_vec3()
+}
+
 /// Unit normal; `None` where the height over the longest edge is below a millionth of that edge, so that rounding would
 /// decide which way the triangle faces.
 #[inline(always)]
@@ -376,14 +409,14 @@ fn normal_of([a, b, c]: [Vec3; 3]) -> Option<Vec3> {
 }
 
 /// A ray in the frame of the watertight test: sheared so that it runs along its longest axis.
-struct Ray {
+pub(super) struct Ray {
     origin: Vec3,
     axes: [usize; 3],
     shear: [f64; 3],
 }
 
 impl Ray {
-    fn new(origin: Vec3, direction: Vec3) -> Option<Self> {
+    pub(super) fn new(origin: Vec3, direction: Vec3) -> Option<Self> {
         let size = crate::math::abs3(direction);
         let z = if size.x >= size.y && size.x >= size.z { 0 } else { 1 + usize::from(size.z > size.y) };
         if !(size[z] > 0.0 && direction.is_finite() && origin.is_finite()) {
@@ -395,7 +428,7 @@ impl Ray {
     }
 
     /// How far along the ray a triangle is met, and whether from behind.
-    fn hit(&self, corners: &[Vec3; 3], sides: MeshSides) -> Option<(Real, bool)> {
+    pub(super) fn hit(&self, corners: &[Vec3; 3], sides: MeshSides) -> Option<(Real, bool)> {
         let origin = self.origin.as_dvec3();
         let [x, y, z] = self.axes;
         let sheared = corners.map(|corner| {

@@ -43,7 +43,7 @@ const SEAM_GAP: Real = 1e-4;
 pub(crate) struct Bend(i16);
 
 impl Bend {
-    const BOUNDARY: Self = Self(i16::MIN);
+    pub(super) const BOUNDARY: Self = Self(i16::MIN);
     /// Steps up to a right angle.
     const QUARTER: Real = 16000.0;
     /// Steps that count as flat: [`FLAT_SINE`].
@@ -51,7 +51,7 @@ impl Bend {
 
     /// The bend from a triangle (unit normal, unit vector inwards from the edge) to a neighbour (unit vector away from the
     /// edge).
-    fn new(kind: EdgeKind, normal: Vec3, own: Vec3, neighbor: Vec3) -> Self {
+    pub(super) fn new(kind: EdgeKind, normal: Vec3, own: Vec3, neighbor: Vec3) -> Self {
         if kind == EdgeKind::Boundary {
             return Self::BOUNDARY;
         }
@@ -105,6 +105,12 @@ pub(crate) struct Surroundings {
 }
 
 impl Surroundings {
+    /// As said at the fields.
+    #[inline(always)]
+    pub(super) fn from_parts(id: u32, patch: u32, bends: [Bend; 3], bits: u16) -> Self {
+        Self { id, patch, bends, bits }
+    }
+
     /// How the surface bends across edge `i` (from corner `i` to the next).
     pub(crate) fn bend(&self, i: usize) -> Bend {
         self.bends[i]
@@ -256,13 +262,7 @@ impl<'a> Adjacency<'a> {
             }
         }
         let Some((closing, other, inward)) = closest else { return };
-        let kind = if closing > FLAT_SINE {
-            EdgeKind::Concave
-        } else if closing < -FLAT_SINE {
-            EdgeKind::Convex
-        } else {
-            EdgeKind::Flat
-        };
+        let kind = kind_of(closing);
         self.bends[side.triangle as usize][side.edge as usize] = Bend::new(kind, normal, own, inward);
         if kind == EdgeKind::Flat {
             self.join_patches(side.triangle, other);
@@ -351,6 +351,21 @@ impl<'a> Adjacency<'a> {
     fn join_patches(&mut self, a: u32, b: u32) {
         let (a, b) = (self.patch(a), self.patch(b));
         self.patches[a.max(b) as usize] = a.min(b);
+    }
+}
+
+/// The kind of the edge from a triangle (unit normal, unit vector inwards from the edge) to one neighbour.
+pub(super) fn kind_between(normal: Vec3, own: Vec3, neighbor: Vec3) -> EdgeKind {
+    kind_of(closing(neighbor, normal, own))
+}
+
+fn kind_of(closing: Real) -> EdgeKind {
+    if closing > FLAT_SINE {
+        EdgeKind::Concave
+    } else if closing < -FLAT_SINE {
+        EdgeKind::Convex
+    } else {
+        EdgeKind::Flat
     }
 }
 

@@ -23,7 +23,7 @@ use crate::broad_phase::BroadPhase;
 use crate::math::{Aabb, Pose, Real, Vec3, max, min};
 use crate::narrow_phase::{Support, Sweep, gap, time_of_impact};
 use crate::parallel::SharedSlice;
-use crate::shape::{Capsule, Cuboid, MeshSides, Shape, Sphere, TriangleMesh};
+use crate::shape::{Capsule, Cuboid, MeshSides, Shape, Sphere, Surface};
 use crate::solver::SolverBodies;
 
 impl World {
@@ -119,7 +119,8 @@ impl ImpactSearch<'_> {
                 let pose = body.pose.mul(&other.pose);
                 let mover = mover.relative_to(&pose);
                 let impact = match &other.geometry {
-                    Shape::Mesh(mesh) => self.mesh_impact(mesh, &mover, near),
+                    Shape::Mesh(mesh) => self.mesh_impact(Surface::Mesh(mesh), &mover, near),
+                    Shape::HeightField(field) => self.mesh_impact(Surface::Field(field), &mover, near),
                     convex => Support::new(convex).and_then(|fixed| self.impact(&fixed, &mover)),
                 };
                 first = min(impact.unwrap_or(limit), first);
@@ -129,7 +130,7 @@ impl ImpactSearch<'_> {
     }
 
     /// First impact with a triangle of a mesh, coming from its solid side; all in the mesh's frame.
-    fn mesh_impact(&self, mesh: &TriangleMesh, mover: &Mover<'_>, near: Real) -> Option<Real> {
+    fn mesh_impact(&self, mesh: Surface<'_>, mover: &Mover<'_>, near: Real) -> Option<Real> {
         let mut first = None;
         let bulge = mover.bulge();
         mesh.for_each_facet(&mover.core_box(near), |index| {

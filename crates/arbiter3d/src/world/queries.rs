@@ -57,7 +57,7 @@ pub struct RayHit {
     pub normal: Vec3,
     /// Share of the direction travelled.
     pub fraction: Real,
-    /// Triangle of a mesh, as numbered by the user.
+    /// Triangle of a mesh, as numbered by the user, or of a height field.
     pub triangle: Option<u32>,
 }
 
@@ -157,6 +157,10 @@ impl World {
 fn cast_shape(shape: &ShapeSlot, ray: &Ray) -> Option<(ShapeHit, Option<u32>)> {
     if let Shape::Mesh(mesh) = &shape.geometry {
         let hit = mesh.cast_ray(ray.origin, ray.direction, ray.max_fraction)?;
+        return Some((ShapeHit { fraction: hit.distance, normal: hit.normal }, Some(hit.triangle)));
+    }
+    if let Shape::HeightField(field) = &shape.geometry {
+        let hit = field.cast_ray(ray.origin, ray.direction, ray.max_fraction)?;
         return Some((ShapeHit { fraction: hit.distance, normal: hit.normal }, Some(hit.triangle)));
     }
     cast_ray(&shape.geometry, ray).map(|hit| (hit, None))
