@@ -257,6 +257,18 @@ pub static SCENES: &[Scene] = &[
         size: Size::FIXED,
         build: scenes::behaviour::t_handle,
     },
+    Scene {
+        name: "gears",
+        description: "two gears, meshes of 12 and 24 teeth: the small one drives the large one",
+        size: Size::FIXED,
+        build: scenes::surfaces::gears,
+    },
+    Scene {
+        name: "height_field_tiles",
+        description: "200 mixed bodies fall on 3 × 3 height fields side by side",
+        size: Size::new("bodies", 200, 100_000),
+        build: scenes::surfaces::height_field_tiles,
+    },
 ];
 
 #[cfg(test)]

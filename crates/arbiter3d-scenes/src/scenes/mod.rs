@@ -6,6 +6,7 @@ pub(crate) mod drums;
 pub(crate) mod fields;
 pub(crate) mod piles;
 pub(crate) mod stacks;
+pub(crate) mod surfaces;
 pub(crate) mod trees;
 
 #[cfg(test)]

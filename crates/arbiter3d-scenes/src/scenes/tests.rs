@@ -37,6 +37,8 @@ fn scenes_have_their_published_counts() {
         ("ramps", None, 11),
         ("bounce", None, 11),
         ("t_handle", None, 1),
+        ("gears", None, 1),
+        ("height_field_tiles", None, 200),
     ];
     for (name, size, count) in counts {
         assert_eq!(dynamic(&built(name, size).world).len(), count, "{name}");

@@ -64,7 +64,16 @@ impl Contact<'_> {
             reach.second_look = true;
             self.touch_all(solid, &frame, &reach, &mut candidates);
         }
-        candidates.choose(|candidate| self.manifold.push(point_in_mesh(self.mesh, &frame, candidate)));
+        let (mesh, manifold, mut deepest) = (self.mesh, &mut *self.manifold, (Real::MAX, 0));
+        candidates.choose(|candidate| {
+            if candidate.separation < deepest.0 {
+                deepest = (candidate.separation, candidate.triangle as usize);
+            }
+            manifold.push(point_in_mesh(mesh, &frame, candidate));
+        });
+        if deepest.0 < Real::MAX {
+            manifold.set_materials([mesh.material(deepest.1), 0]);
+        }
     }
 
     /// Adds the points of all triangles near the shape. Returns whether one might overlap that gave no point.

@@ -27,13 +27,14 @@ mod penetration;
 mod polyhedron;
 mod sphere;
 mod support;
+mod surfaces;
 mod time_of_impact;
 mod triangle;
 mod triangle_lanes;
 mod triangle_solid;
 
 pub(crate) use cuboid::{CuboidLanes, CuboidPair, Near as NearCuboids, WideManifold};
-pub(crate) use distance::closest;
+pub(crate) use distance::{Cast, CastPoint, closest, linear_cast};
 pub(crate) use support::Support;
 pub(crate) use time_of_impact::{Sweep, gap, time_of_impact};
 
@@ -60,7 +61,7 @@ pub struct PairCache {
 /// Finds the contacts of two shapes that are closer than `margin` (metres, zero or more).
 ///
 /// `pose` places shape 2 in the frame of shape 1; the manifold is in that frame, its normals point from shape 1 to
-/// shape 2. Two meshes never touch.
+/// shape 2.
 ///
 /// ```
 /// use arbiter3d::{Shape, math::{Pose, Vec3}, narrow_phase::{Manifold, PairCache, collide}};
@@ -143,6 +144,7 @@ fn collide_sorted(
 fn collide_surface(shape1: &Shape, shape2: &Shape, pose: &Pose, margin: Real, manifold: &mut Manifold) {
     match (Surface::of(shape1), Surface::of(shape2)) {
         (Some(a), None) => mesh::collide(a, shape2, pose, margin, manifold),
+        (Some(a), Some(b)) => surfaces::collide((a, b), pose, margin, manifold),
         _ => manifold.clear(),
     }
 }
@@ -153,6 +155,8 @@ fn mirror(pose: &Pose, manifold: &mut Manifold) {
         point.point1 = pose.transform_point(point.point2());
         point.normal = -pose.rotation.rotate(point.normal);
     }
+    let [a, b] = manifold.materials();
+    manifold.set_materials([b, a]);
 }
 
 #[cfg(test)]

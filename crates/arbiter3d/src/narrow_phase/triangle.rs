@@ -225,13 +225,14 @@ impl<'a> Triangle<'a> {
             separation: height - radius,
             feature: feature_id(self.around.patch, feature),
             facet: self.index,
+            triangle: self.index,
         }
     }
 
     /// A point on an edge or a corner.
     pub(super) fn rim_candidate(&self, position: Vec3, normal: Vec3, separation: Real, feature: u32) -> Candidate {
         let feature = feature_id(self.around.id, feature);
-        Candidate { position, normal, separation, feature, facet: NO_FACET }
+        Candidate { position, normal, separation, feature, facet: NO_FACET, triangle: self.index }
     }
 }
 

@@ -652,6 +652,7 @@ impl Pair<'_> {
             separation: -depth,
             feature: feature_id(self.triangle.around.id, feature),
             facet: self.triangle.index,
+            triangle: self.triangle.index,
         });
     }
 }

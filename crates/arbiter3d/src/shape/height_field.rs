@@ -325,6 +325,10 @@ impl HeightField {
         lanes
     }
 
+    pub(crate) fn has_materials(&self) -> bool {
+        !self.materials.is_empty()
+    }
+
     pub(crate) fn material(&self, index: usize) -> u8 {
         self.materials.get(index / 2).copied().unwrap_or(0)
     }

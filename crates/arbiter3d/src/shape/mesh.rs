@@ -10,12 +10,14 @@
 
 use super::geometry::Geometry;
 use super::mesh_edges::{Adjacency, Surface, Surroundings};
-use super::mesh_tree::{LEAF, Leaves, MeshTree, Slabs};
+use super::mesh_interior::Interior;
+use super::mesh_tree::{Descent, LEAF, Leaves, MeshTree, Slabs};
 use super::{MassProperties, ShapeError};
 use crate::math::{Aabb, Real, Vec3, max3, min3};
 use crate::query::{self, ShapeHit};
 use crate::simd::{LaneVec3, Lanes, Quad};
 use glam::DVec3;
+use std::sync::OnceLock;
 
 /// Which side of its triangles a mesh is solid on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -86,6 +88,9 @@ pub struct TriangleMesh {
     surroundings: Vec<Surroundings>,
     /// Of each of the user's triangles; empty if all are zero.
     materials: Vec<u8>,
+    open_edges: usize,
+    /// Of a closed mesh, once it is asked for.
+    interior: OnceLock<Interior>,
 }
 
 impl TriangleMesh {
@@ -154,12 +159,13 @@ impl TriangleMesh {
         adjacency.close_seams(|point, gap, visit| {
             tree.query(&Aabb::from_center(point, Vec3::splat(gap)), |slot| visit(order[slot]));
         });
+        let open_edges = adjacency.open_edges();
         let surroundings = adjacency.finish(&order);
         vertices.reserve_exact(1);
         vertices.push(Vec3::ZERO);
         vertices.shrink_to_fit();
         triangles.shrink_to_fit();
-        Self { vertices, triangles, sides, tree, surroundings, materials: Vec::new() }
+        Self { vertices, triangles, sides, tree, surroundings, materials: Vec::new(), open_edges, interior: OnceLock::new() }
     }
 
     /// The same with materials: for each triangle as given which of
@@ -194,6 +200,18 @@ impl TriangleMesh {
         &self.triangles
     }
 
+    /// Edges that no triangle closes, or along which two triangles wind the same way; corners count as one where their
+    /// positions are equal. A mesh without any is closed: it has a volume, and dynamic bodies can carry it.
+    #[must_use]
+    pub fn open_edges(&self) -> usize {
+        self.open_edges
+    }
+
+    /// What is known of the inside of a closed mesh.
+    fn interior(&self) -> Option<&Interior> {
+        (self.open_edges == 0).then(|| self.interior.get_or_init(|| Interior::of(self)))
+    }
+
     /// Which sides are solid.
     #[must_use]
     pub fn sides(&self) -> MeshSides {
@@ -210,25 +228,37 @@ impl TriangleMesh {
     /// from the front only. Of triangles met at the same distance the one with the smallest number is reported.
     #[must_use]
     pub fn cast_ray(&self, origin: Vec3, direction: Vec3, limit: Real) -> Option<MeshRayHit> {
-        let ray = Ray::new(origin, direction)?;
-        let mut best: Option<(Real, usize, bool)> = None;
-        let mut reach = limit;
-        self.tree.cast(&Slabs::new(origin, direction), limit, |index| {
-            let id = self.surroundings[index].id;
-            if let Some((distance, back)) = ray.hit(&self.corners(index), self.sides)
-                && distance <= reach
-                && best.is_none_or(|(d, other, _)| (distance, id) < (d, self.surroundings[other].id))
-            {
-                reach = distance;
-                best = Some((distance, index, back));
-            }
-            reach
-        });
-        best.map(|(distance, index, back)| {
+        self.first_hit(origin, direction, limit, self.sides).map(|(distance, index, back)| {
             let normal = self.facet(index).normal();
             let normal = if back { -normal } else { normal };
             MeshRayHit { distance, normal, triangle: self.surroundings[index].id }
         })
+    }
+
+    /// How far away a ray meets which triangle (its internal number), and whether from behind.
+    pub(super) fn first_hit(
+        &self,
+        origin: Vec3,
+        direction: Vec3,
+        limit: Real,
+        sides: MeshSides,
+    ) -> Option<(Real, usize, bool)> {
+        let ray = Ray::new(origin, direction)?;
+        let slabs = Slabs::of_point(origin, direction);
+        let mut search = RaySearch { mesh: self, ray, slabs, sides, best: None };
+        self.tree.descend(limit, &mut search);
+        search.best
+    }
+
+    /// Shows the triangles to a search that wants the nearest first.
+    pub(crate) fn descend(&self, limit: Real, search: &mut impl Descent) {
+        self.tree.descend(limit, search);
+    }
+
+    /// The user's number of a triangle.
+    #[inline(always)]
+    pub(crate) fn id(&self, index: usize) -> u32 {
+        self.surroundings[index].id
     }
 
     pub(crate) fn local_aabb(&self) -> Aabb {
@@ -352,12 +382,15 @@ impl Geometry for TriangleMesh {
         self.local_aabb()
     }
 
-    fn mass_properties(&self, _: Real) -> Result<MassProperties, ShapeError> {
-        Err(ShapeError::NoVolume { shape: "a mesh", advice: "put it on a static or kinematic body" })
+    fn mass_properties(&self, density: Real) -> Result<MassProperties, ShapeError> {
+        let interior = self.interior().ok_or(ShapeError::OpenMesh { edges: self.open_edges })?;
+        let advice = "turn its triangles around: seen from outside they have to wind counter-clockwise";
+        let unit = interior.unit.ok_or(ShapeError::NoVolume { shape: "the mesh", advice })?;
+        Ok(unit.scaled(density))
     }
 
     fn inner_ball(&self) -> (Vec3, Real) {
-        (self.local_aabb().center(), 0.0)
+        self.interior().map_or((self.local_aabb().center(), 0.0), |interior| interior.ball)
     }
 
     fn cast_ray(&self, ray: &query::Ray) -> Option<ShapeHit> {
@@ -450,6 +483,40 @@ impl Ray {
         // The sum is minus twice the area as seen along the axis, which the ray may run down.
         let back = (sum < 0.0) != (self.shear[2] < 0.0);
         (distance >= 0.0 && !(back && sides == MeshSides::One)).then_some((distance, back))
+    }
+}
+
+/// The first triangle along a ray.
+struct RaySearch<'a> {
+    mesh: &'a TriangleMesh,
+    ray: Ray,
+    slabs: Slabs,
+    sides: MeshSides,
+    /// Distance, internal number, whether hit from behind.
+    best: Option<(Real, usize, bool)>,
+}
+
+impl Descent for RaySearch<'_> {
+    #[inline(always)]
+    fn distances<W: Lanes<LEAF>>(&self, low: &LaneVec3<W>, high: &LaneVec3<W>, limit: Real) -> W {
+        self.slabs.enter(low, high, limit)
+    }
+
+    #[inline(always)]
+    fn leaf<W: Lanes<LEAF>>(&mut self, first: usize, count: usize, limit: Real) -> Real {
+        let mut limit = limit;
+        for index in first..first + count {
+            let Some((distance, back)) = self.ray.hit(&self.mesh.corners(index), self.sides) else { continue };
+            let first = match self.best {
+                Some((best, other, _)) => (distance, self.mesh.id(index)) < (best, self.mesh.id(other)),
+                None => true,
+            };
+            if distance <= limit && first {
+                limit = distance;
+                self.best = Some((distance, index, back));
+            }
+        }
+        limit
     }
 }
 

@@ -78,6 +78,11 @@ impl Bend {
         }
     }
 
+    /// Whether no other triangle has the edge.
+    pub(crate) fn is_boundary(self) -> bool {
+        self == Self::BOUNDARY
+    }
+
     /// Unit vector in the plane of the neighbour, at a right angle to the edge and away from it, for a triangle with that
     /// normal and that vector inwards from the edge; zero at a boundary.
     pub(crate) fn across(self, normal: Vec3, own: Vec3) -> Vec3 {
@@ -177,6 +182,8 @@ pub(super) struct Adjacency<'a> {
     patches: Vec<u32>,
     /// For each welded corner [`SHARP`] if a convex or open edge ends there, [`BENT`] if any edge that is not flat does.
     corners: Vec<u8>,
+    /// Sides that no side of the opposite direction matches.
+    open_edges: usize,
 }
 
 const SHARP: u8 = 1;
@@ -198,6 +205,7 @@ impl<'a> Adjacency<'a> {
             bends: vec![[Bend::BOUNDARY; 3]; surface.triangles.len()],
             patches: (0..surface.triangles.len() as u32).collect(),
             corners: vec![0; surface.vertices.len()],
+            open_edges: 0,
         };
         let (first, mut sides) = adjacency.sides();
         let mut inwards = Vec::new();
@@ -205,6 +213,7 @@ impl<'a> Adjacency<'a> {
             let at_corner = &mut sides[range[0] as usize..range[1] as usize];
             at_corner.sort_unstable();
             for group in at_corner.chunk_by(|a, b| a.end == b.end) {
+                adjacency.open_edges += adjacency.unmatched(group);
                 inwards.clear();
                 inwards.extend(group.iter().map(|side| surface.inward(side.triangle, side.edge)));
                 for (k, side) in group.iter().enumerate() {
@@ -214,6 +223,17 @@ impl<'a> Adjacency<'a> {
             }
         }
         adjacency
+    }
+
+    /// How many sides of an edge no side of the opposite direction matches. Zero for all edges of a closed mesh.
+    pub(super) fn open_edges(&self) -> usize {
+        self.open_edges
+    }
+
+    fn unmatched(&self, sides: &[Side]) -> usize {
+        let forward = |side: &&Side| self.welded_corner(side.triangle, side.edge as usize) != side.end;
+        let forward = sides.iter().filter(forward).count();
+        forward.abs_diff(sides.len() - forward)
     }
 
     fn welded_corner(&self, triangle: u32, i: usize) -> u32 {

@@ -25,6 +25,7 @@ mod hull_merge;
 mod mass;
 mod mesh;
 mod mesh_edges;
+mod mesh_interior;
 mod mesh_tree;
 mod mesh_tree_builder;
 mod point_cloud;
@@ -50,7 +51,8 @@ pub use mass::MassProperties;
 pub(crate) use mesh::Facet;
 pub use mesh::{MeshRayHit, MeshSides, TriangleMesh};
 pub(crate) use mesh_edges::Surroundings;
-pub(crate) use mesh_tree::{LEAF, Leaves};
+pub(crate) use mesh_interior::distance_squared;
+pub(crate) use mesh_tree::{Descent, LEAF, Leaves, Slabs, box_distances};
 pub use point_cloud::PointCloud;
 pub use rounded::Rounded;
 pub use sphere::Sphere;
@@ -188,7 +190,7 @@ pub enum ShapeError {
         advice: &'static str,
     },
     /// A mesh with holes has no inside, so no mass.
-    #[error("{edges} edges of the mesh have no matching neighbour: close the mesh, or put it on a static body")]
+    #[error("{edges} edges of the mesh have no matching neighbour: close it, give the shape density 0, or use a static body")]
     OpenMesh {
         /// How many edges are open, or run the same way in two triangles.
         edges: usize,

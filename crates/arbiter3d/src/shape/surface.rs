@@ -113,6 +113,14 @@ impl<'a> Surface<'a> {
         }
     }
 
+    /// Whether triangles may have other materials than the first of the palette.
+    pub(crate) fn has_materials(self) -> bool {
+        match self {
+            Self::Mesh(mesh) => !mesh.materials().is_empty(),
+            Self::Field(field) => field.has_materials(),
+        }
+    }
+
     /// Which material of the palette a triangle has.
     #[inline(always)]
     pub(crate) fn material(self, index: usize) -> u8 {

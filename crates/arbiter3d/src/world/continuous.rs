@@ -17,6 +17,7 @@
 use super::World;
 use super::bodies::Body;
 use super::definition::BodyKind;
+use super::one_way;
 use super::settings::WorldSettings;
 use super::shapes::ShapeSlot;
 use crate::broad_phase::BroadPhase;
@@ -118,6 +119,10 @@ impl ImpactSearch<'_> {
             if body.kind == BodyKind::Static && !other.sensor && mover.shape.filter.accepts(&other.filter) {
                 let pose = body.pose.mul(&other.pose);
                 let mover = mover.relative_to(&pose);
+                let ends = (&mover.path.start, &mover.path.end);
+                if one_way::lets_pass(other, &mover.shape.geometry, ends, self.settings.speculative_distance) {
+                    return;
+                }
                 let impact = match &other.geometry {
                     Shape::Mesh(mesh) => self.mesh_impact(Surface::Mesh(mesh), &mover, near),
                     Shape::HeightField(field) => self.mesh_impact(Surface::Field(field), &mover, near),

@@ -63,6 +63,7 @@ impl World {
         }
         for slot in 0..self.shapes.len() as u32 {
             self.broad_phase.touch(slot);
+            self.note_still(slot);
         }
         self.flush_events();
     }

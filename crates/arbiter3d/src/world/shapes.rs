@@ -1,15 +1,16 @@
 //! Shapes on bodies: what the world keeps of them, and how users read and change them.
 
 use super::World;
-use super::definition::{BodyKind, Filter, Material, ShapeDefinition};
+use super::definition::{BodyKind, ContactEvents, Filter, Material, ShapeDefinition};
 use crate::arbiter::{EndReason, NONE};
 use crate::broad_phase::TreeKind;
-use crate::error::{Error, unit_rotation};
+use crate::error::{Error, unit_rotation, unit_vec};
 use crate::id::{BodyId, ShapeId};
 use crate::math::{Aabb, Pose, Quat, Real, Vec3};
 use crate::place_table::mix;
 use crate::shape::Shape;
 use crate::storage;
+use std::sync::Arc;
 
 /// What the world keeps of a shape.
 #[derive(Clone, Debug)]
@@ -28,15 +29,32 @@ pub(crate) struct ShapeSlot {
     /// Distance of the farthest point of the shape from that middle.
     pub reach: Real,
     pub sensor: bool,
+    pub events: ContactEvents,
     /// Where the shape's frame sits on the body.
     pub pose: Pose,
     pub density: Real,
     pub material: Material,
+    /// Materials of parts of the surface; empty where all of it is of one.
+    pub palette: Option<Arc<[Material]>>,
     pub filter: Filter,
+    /// The way in which bodies pass through it, in its frame, of unit length.
+    pub one_way: Option<Vec3>,
     pub user_data: u128,
 }
 
 impl ShapeSlot {
+    /// The material of a part of the surface.
+    pub fn surface(&self, index: u8) -> &Material {
+        self.palette.as_ref().and_then(|palette| palette.get(index as usize)).unwrap_or(&self.material)
+    }
+
+    /// Whether some part of the surface has a restitution.
+    #[inline(always)]
+    pub fn bounces(&self) -> bool {
+        let palette = self.palette.as_deref().unwrap_or_default();
+        self.material.restitution > 0.0 || palette.iter().any(|material| material.restitution > 0.0)
+    }
+
     /// Notes where the centre of mass of the body is.
     pub fn set_center(&mut self, center: Vec3) {
         self.from_center = Pose::new(self.pose.position - center, self.pose.rotation);
@@ -135,6 +153,12 @@ impl<'a> ShapeRef<'a> {
         self.slot.material
     }
 
+    /// The materials of its triangles or cells; empty where all of it is of [`ShapeRef::material`].
+    #[must_use]
+    pub fn palette(&self) -> &'a [Material] {
+        self.slot.palette.as_deref().unwrap_or_default()
+    }
+
     /// Which shapes it meets.
     #[must_use]
     pub fn filter(&self) -> Filter {
@@ -145,6 +169,18 @@ impl<'a> ShapeRef<'a> {
     #[must_use]
     pub fn is_sensor(&self) -> bool {
         self.slot.sensor
+    }
+
+    /// What it asks to be told of its arbiters.
+    #[must_use]
+    pub fn events(&self) -> ContactEvents {
+        self.slot.events
+    }
+
+    /// The way in which bodies pass through it, a unit vector in its frame.
+    #[must_use]
+    pub fn one_way(&self) -> Option<Vec3> {
+        self.slot.one_way
     }
 
     /// Yours.
@@ -170,14 +206,20 @@ impl<'a> ShapeMut<'a> {
     }
 
     /// Changes the surface. Live arbiters of the shape follow in the next step, but for what users have set on them.
+    /// Where the surface moves at another speed than before, what touches it wakes.
     ///
     /// # Errors
     /// If a number is not finite or out of its range.
     pub fn set_material(&mut self, material: Material) -> Result<(), Error> {
         material.validate()?;
-        self.slot().material = material;
+        let old = std::mem::replace(&mut self.slot().material, material.normalized());
         let body = self.slot().body;
         self.world.refresh_materials_of(body);
+        if old.tangent_velocity != material.tangent_velocity {
+            // A belt that is switched on carries off what sleeps on it.
+            self.world.wake_neighbours(body);
+            self.world.wake(body);
+        }
         Ok(())
     }
 
@@ -192,11 +234,32 @@ impl<'a> ShapeMut<'a> {
     pub fn set_sensor(&mut self, sensor: bool) {
         if self.slot().sensor != sensor {
             self.slot().sensor = sensor;
+            self.world.sensors = if sensor { self.world.sensors + 1 } else { self.world.sensors - 1 };
             let body = self.slot().body;
             self.world.renew_proxy(self.slot, EndReason::FilterChanged);
             self.world.update_mass(body);
             self.world.flush_events();
         }
+    }
+
+    /// Changes what it asks to be told of its arbiters, from the next step on.
+    pub fn set_events(&mut self, events: ContactEvents) {
+        self.slot().events = events;
+        self.world.refresh_traits(self.slot);
+    }
+
+    /// Makes it a platform that bodies pass through along a unit vector in its frame, or solid from all sides. What
+    /// stands on it goes on standing, what is passing is judged anew.
+    ///
+    /// # Errors
+    /// If the vector is not finite and of unit length.
+    pub fn set_one_way(&mut self, one_way: Option<Vec3>) -> Result<(), Error> {
+        self.slot().one_way = one_way.map(|way| unit_vec("one_way", way)).transpose()?;
+        self.world.refresh_traits(self.slot);
+        let body = self.slot().body;
+        self.world.forget_manifolds(body);
+        self.world.wake(body);
+        Ok(())
     }
 
     /// Changes the density, kg/m³, and with it the mass of the body.
@@ -225,13 +288,14 @@ impl World {
     /// Attaches a shape to a body and returns its id. The body's mass follows unless it was given.
     ///
     /// # Errors
-    /// If the body is unknown, a number is out of its range, or a mesh would go on a dynamic body.
+    /// If the body is unknown, a number is out of its range, or a shape without a volume (an open mesh, a height field, a
+    /// half-space, a triangle) would go on a dynamic body, unless it is a sensor or its density is zero.
     pub fn add_shape(&mut self, body: BodyId, definition: &ShapeDefinition) -> Result<ShapeId, Error> {
         let index = self.body_index(body)?;
         definition.validate()?;
         let rotation = unit_rotation("shape rotation", definition.rotation)?;
-        if !definition.shape.is_convex() && self.bodies[index as usize].kind == BodyKind::Dynamic {
-            return Err(Error::MeshNotDynamic);
+        if self.bodies[index as usize].kind == BodyKind::Dynamic && !definition.sensor {
+            has_mass(&definition.shape, definition.density)?;
         }
         let id = ShapeId(self.next_id);
         self.next_id += 1;
@@ -245,9 +309,12 @@ impl World {
             reach: definition.shape.reach_from(definition.shape.local_aabb().center()),
             geometry: definition.shape.clone(),
             density: definition.density,
-            material: definition.material,
+            material: definition.material.normalized(),
+            palette: (!definition.palette.is_empty()).then(|| definition.palette.iter().map(|m| m.normalized()).collect()),
             filter: definition.filter,
             sensor: definition.sensor,
+            events: definition.events,
+            one_way: definition.one_way.map(|way| way / way.length()),
             user_data: definition.user_data,
         };
         let slot = if let Some(slot) = self.free_shapes.pop() {
@@ -258,6 +325,7 @@ impl World {
             self.moved_shapes.push(false);
             (self.shapes.len() - 1) as u32
         };
+        self.sensors += u32::from(definition.sensor);
         let shapes = &self.shapes;
         self.shape_slots.insert(mix(0, id.0), slot, |slot| mix(0, shapes[slot as usize].id.0));
         let owner = &mut self.bodies[index as usize];
@@ -304,12 +372,14 @@ impl World {
         let hash = |slot: u32| mix(0, shapes[slot as usize].id.0);
         self.shape_slots.remove(hash(slot), slot, hash);
         self.shapes[slot as usize].body = NONE;
+        self.sensors -= u32::from(self.shapes[slot as usize].sensor);
         self.free_shapes.push(slot);
     }
 
-    pub(crate) fn carries_mesh(&self, body: u32) -> bool {
-        let slots = &self.bodies[body as usize].shape_slots;
-        slots.iter().any(|&slot| !self.shapes[slot as usize].geometry.is_convex())
+    /// Checks that all shapes of a body may be carried by a dynamic one.
+    pub(crate) fn check_dynamic(&self, body: u32) -> Result<(), Error> {
+        let shapes = self.bodies[body as usize].shape_slots.iter().map(|&slot| &self.shapes[slot as usize]);
+        shapes.filter(|shape| !shape.sensor).try_for_each(|shape| has_mass(&shape.geometry, shape.density))
     }
 
     /// Box of a shape now.
@@ -336,6 +406,7 @@ impl World {
             BodyKind::Kinematic | BodyKind::Dynamic => TreeKind::Moving,
         };
         self.broad_phase.add(slot, kind, fat);
+        self.note_still(slot);
     }
 
     /// Takes a shape out of the broad phase with all its pairs.
@@ -361,6 +432,7 @@ impl World {
             self.remove_pair(pair, EndReason::FilterChanged);
         }
         self.broad_phase.touch(slot);
+        self.note_still(slot);
         self.wake(body);
     }
 
@@ -373,4 +445,12 @@ impl World {
         }
         self.wake(body);
     }
+}
+
+/// A shape that is to give a dynamic body a mass must have a volume.
+fn has_mass(shape: &Shape, density: Real) -> Result<(), Error> {
+    if density > 0.0 {
+        shape.mass_properties(density)?;
+    }
+    Ok(())
 }

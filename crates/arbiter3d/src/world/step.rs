@@ -133,7 +133,9 @@ impl World {
         self.call_providers();
         clock.mark(Phase::NarrowPhase);
         self.raise_begin();
+        self.raise_pre_solve();
         self.admit_woken();
+        self.note_closing();
         clock.mark(Phase::BeginEvents);
         self.plan_rows();
         clock.mark(Phase::Coloring);
@@ -142,10 +144,13 @@ impl World {
         self.solve(dt);
         clock.mark(Phase::Solve);
         self.store_rows();
+        let hits = self.events.hit.events.len();
+        self.note_hits();
         clock.mark(Phase::Store);
         self.finalize(dt, &mut report);
         clock.mark(Phase::Finalize);
         self.end_broken();
+        self.raise_hits(hits);
         self.flush_events();
         clock.mark(Phase::EndEvents);
         self.sleep_islands();
@@ -169,6 +174,7 @@ impl World {
             && self.arbiters.are_asleep()
             && !self.broad_phase.has_moved()
             && self.scratch.moved.is_empty()
+            && self.resting_sensors.is_empty()
             && self.providers.is_empty()
             && self.removals.is_empty()
             && self.events.are_told()
@@ -234,6 +240,9 @@ impl World {
         }
         let mut found = std::mem::take(&mut self.scratch.pairs);
         self.search_pairs(&mut found);
+        if !self.still_news.is_empty() {
+            self.find_still_sensors(&mut found);
+        }
         found.retain(|&(a, b)| self.passes_pair_filter(a, b));
         self.add_pairs(&found);
         found.clear();

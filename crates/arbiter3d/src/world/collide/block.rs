@@ -4,10 +4,11 @@
 //! many pairs at once; what a pass leaves for the next stands in small lists. Pairs of cuboids are gathered and collided `L`
 //! at a time.
 
-use super::super::arbiters::surface_velocity;
-use super::super::pairs::{Pair, REUSE_ROTATION};
+use super::super::arbiters::{mix_shape_materials, surface_velocity, turn_anisotropy};
+use super::super::one_way::{self, Approach, Verdict};
+use super::super::pairs::{PRE_SOLVE, Pair, REUSE_ROTATION, WATCHED};
 use super::super::shapes::ShapeSlot;
-use super::contacts::{FrameRecords, PairFrame, Places, WideFrame, turn_levers, update_contacts};
+use super::contacts::{FrameRecords, PairFrame, Place, Places, WideFrame, turn_levers, update_contacts};
 use super::{Begin, CollideContext, News};
 use crate::arbiter::{Arbiter, ArbiterKey, ContactData, NONE, TANGENT_VELOCITY_OVERRIDDEN};
 use crate::math::{Pose, Real, Rotation, Vec3, max, min};
@@ -147,6 +148,9 @@ impl<W: Lanes<L>, const L: usize> BlockKernel<'_, W, L> {
                     self.news.push(News::Apart(index));
                 } else {
                     self.context.prefetch_bodies(pair);
+                    if pair.traits & WATCHED != 0 {
+                        self.news.push(News::Watched(index, pair.arbiter != NONE));
+                    }
                     near.push(index);
                 }
             }
@@ -338,8 +342,23 @@ impl<W: Lanes<L>, const L: usize> BlockKernel<'_, W, L> {
             }
             return;
         }
+        if pair.materials != manifold.materials() && !manifold.points().is_empty() {
+            self.change_materials(fresh.pair, manifold.materials());
+        }
+        let pair = self.pairs.shared(fresh.pair);
         let places = Places::of_manifold(&manifold, &PairFrame::new(pair, context.shapes, context.solver));
         self.settle(fresh, &places);
+    }
+
+    /// Other parts of the surfaces touch than before.
+    #[cold]
+    fn change_materials(&mut self, index: u32, materials: [u8; 2]) {
+        let context = self.context;
+        let (pair, arbiter) = self.pairs.pair_and_arbiter(index);
+        pair.materials = materials;
+        if let Some(arbiter) = arbiter {
+            mix_shape_materials(pair, &mut arbiter.data, context.shapes, context.bodies);
+        }
     }
 
     /// Gives a new manifold to the arbiter, or begins one.
@@ -348,6 +367,9 @@ impl<W: Lanes<L>, const L: usize> BlockKernel<'_, W, L> {
         let context = self.context;
         let (pair, arbiter) = self.pairs.pair_and_arbiter(item.pair);
         context.note_fresh(pair, item, arbiter.is_some() || places.count == 0);
+        if pair.is_one_way() && !context.one_way_holds(pair, item, places) {
+            return;
+        }
         if let Some(arbiter) = arbiter {
             let rotations = context.rotations(pair);
             update_contacts(&mut arbiter.data, places, rotations, context.settings.contact_break_distance);
@@ -372,12 +394,14 @@ pub(super) fn shapes_relative(between: &Pose, s1: &ShapeSlot, s2: &ShapeSlot) ->
     }
 }
 
-/// Surface velocities turn with their bodies.
+/// Surface velocities and directions of friction turn with their bodies.
 fn turn_conveyor(pair: &Pair, shapes: &[ShapeSlot], rotations: [Rotation; 2], data: &mut ContactData) {
+    let slots = pair.shapes.map(|slot| &shapes[slot as usize]);
+    let materials = [0, 1].map(|side| slots[side].surface(pair.materials[side]));
     if data.flags & TANGENT_VELOCITY_OVERRIDDEN == 0 {
-        let materials = pair.shapes.map(|slot| &shapes[slot as usize].material);
         data.tangent_velocity = surface_velocity(materials, rotations);
     }
+    turn_anisotropy(slots, materials, rotations, data);
 }
 
 impl CollideContext<'_> {
@@ -416,7 +440,7 @@ impl CollideContext<'_> {
             return 0.0;
         }
         let fixed = pair.bodies.iter().any(|&body| self.solver.states[body as usize].is_fixed());
-        if fixed && pair.shapes.iter().all(|&slot| self.shapes[slot as usize].material.restitution == 0.0) {
+        if fixed && pair.shapes.iter().all(|&slot| !self.shapes[slot as usize].bounces()) {
             return self.settings.speculative_distance;
         }
         max(self.settings.speculative_distance, min(self.closing(pair), pair.size))
@@ -425,9 +449,57 @@ impl CollideContext<'_> {
     /// Notes how the bodies stand for which a manifold was made.
     #[inline(always)]
     fn note_fresh(&self, pair: &mut Pair, fresh: &Fresh, reusable: bool) {
-        pair.has_manifold = reusable && self.filters.contact.is_none();
+        pair.has_manifold = reusable && self.filters.contact.is_none() && pair.traits & PRE_SOLVE == 0;
         let shapes = pair.shapes.map(|slot| &self.shapes[slot as usize]);
         pair.note_manifold(&fresh.between, self.solver.masses[pair.bodies[0] as usize].rotation, shapes);
+    }
+
+    /// Whether a new manifold of a pair with a one-way platform counts; see [`one_way`].
+    #[cold]
+    #[inline(never)]
+    fn one_way_holds(&self, pair: &mut Pair, item: &Fresh, places: &Places) -> bool {
+        let places = &places.points[..places.count];
+        if pair.arbiter != NONE {
+            return true;
+        }
+        let overlaps = places.iter().any(|place| place.separation <= 0.0);
+        if places.is_empty() || !overlaps {
+            pair.set_passing(false);
+        }
+        if places.is_empty() || pair.is_passing() {
+            return places.is_empty();
+        }
+        let shapes = pair.shapes.map(|slot| &self.shapes[slot as usize]);
+        let relative = shapes_relative(&item.between, shapes[0], shapes[1]);
+        let seen = [(&shapes[1].geometry, relative), (&shapes[0].geometry, relative.inverse())];
+        let mut verdict = Verdict::Stands;
+        for (side, (visitor, pose)) in seen.iter().enumerate() {
+            if let Some(direction) = shapes[side].one_way {
+                let approach = self.approach(pair, side, direction, places);
+                let speculative = self.settings.speculative_distance;
+                verdict = verdict.max(one_way::judge(shapes[side], direction, (visitor, pose), approach, speculative));
+            }
+        }
+        pair.set_passing(verdict == Verdict::Passes);
+        verdict == Verdict::Stands
+    }
+
+    /// How the other shape of a pair comes to the platform on one side of it.
+    fn approach(&self, pair: &Pair, side: usize, direction: Vec3, places: &[Place]) -> Approach {
+        let rotations = self.rotations(pair);
+        let direction = rotations[side].rotate(self.shapes[pair.shapes[side] as usize].pose.rotation.rotate(direction));
+        let sign = if side == 0 { 1.0 } else { -1.0 };
+        let [v1, v2] = pair.bodies.map(|body| &self.solver.states[body as usize]);
+        let mut approach = Approach { rise: -1.0, way: 0.0 };
+        for place in places {
+            let rise = sign * place.normal.dot(direction);
+            if rise > approach.rise {
+                let velocity1 = v1.linear_velocity + v1.angular_velocity.cross(rotations[0].rotate(place.anchor1));
+                let velocity2 = v2.linear_velocity + v2.angular_velocity.cross(rotations[1].rotate(place.anchor2));
+                approach = Approach { rise, way: sign * (velocity2 - velocity1).dot(direction) * self.dt };
+            }
+        }
+        approach
     }
 
     /// How both bodies are turned.

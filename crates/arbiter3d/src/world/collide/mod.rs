@@ -17,7 +17,7 @@ use super::World;
 use super::arbiters::{fresh_data, mix_shape_materials};
 use super::bodies::Body;
 use super::filters::UserFilters;
-use super::pairs::Pair;
+use super::pairs::{PRE_SOLVE, Pair};
 use super::settings::WorldSettings;
 use super::shapes::ShapeSlot;
 use crate::arbiter::{Arbiter, ArbiterId, ArbiterKey, ContactData, NONE, Name};
@@ -46,6 +46,8 @@ enum News {
     Sensor(u32, bool),
     /// The arbiter has no contacts.
     Empty(u32),
+    /// The shapes ask to be told something of their arbiter, and whether they have one.
+    Watched(u32, bool),
 }
 
 /// A pair whose shapes begin to touch.
@@ -96,6 +98,7 @@ impl World {
         scratch.news.prepare(self.pool.threads(), PAIRS_PER_BLOCK);
         scratch.begins.prepare(self.pool.threads(), PAIRS_PER_BLOCK);
         scratch.blocks.clear();
+        self.events.watched_pairs.clear();
         let blocks = self.active_pairs.words().chunks(WORDS_PER_BLOCK).enumerate();
         scratch.blocks.extend(blocks.filter(|(_, words)| words.iter().any(|&word| word != 0)).map(|(i, _)| i as u32));
         match self.level {
@@ -118,9 +121,11 @@ impl World {
                 News::Apart(pair) => scratch.apart.push(pair),
                 News::Sensor(pair, overlaps) => scratch.sensors.push((pair, overlaps)),
                 News::Empty(arbiter) => scratch.empty.push(arbiter),
+                News::Watched(pair, goes_on) => self.events.watch(pair, goes_on),
             }
         }
         // Threads report in any order; events and places must not depend on it.
+        self.test_resting_sensors(&mut scratch.sensors);
         scratch.sensors.sort_unstable_by_key(|&(pair, _)| self.pair_key(pair));
         for (pair, overlaps) in scratch.sensors.drain(..) {
             self.set_sensor_overlap(pair, overlaps);
@@ -166,11 +171,6 @@ impl World {
                 lanes: PhantomData,
             });
         });
-    }
-
-    fn pair_key(&self, pair: u32) -> ArbiterKey {
-        let [a, b] = self.pairs[pair as usize].shapes.map(|slot| self.shapes[slot as usize].id);
-        ArbiterKey::of_shapes(a, b)
     }
 
     /// Makes the arbiters of the pairs that begin to touch, by key.
@@ -264,7 +264,7 @@ impl<'a> Filler<'a> {
     fn fill(&self, begin: &Begin, pair: &mut Pair, data: &mut ContactData) {
         let rotations = begin.bodies.map(|body| self.masses[body as usize].rotation);
         update_contacts(data, &begin.places, rotations, self.break_distance);
-        pair.has_manifold = self.reusable;
+        pair.has_manifold = self.reusable && pair.traits & PRE_SOLVE == 0;
         mix_shape_materials(pair, data, self.shapes, self.bodies);
     }
 }

@@ -1,0 +1,258 @@
+//! The convex parts of any shape: the one place that knows what a shape is made of.
+//!
+//! Every query but the ray asks for the parts of a shape in some region ([`Region`]) and does the same with each of them: a
+//! convex shape has one part, a mesh one for each triangle. A new kind of convex shape needs nothing here once it has a
+//! [`Support`]. A new kind of composite needs one arm in [`visit_parts`], which hands over every part whose box the region
+//! meets: nearest first if it has a tree of its own, else in any order.
+
+use crate::math::{Aabb, Pose, Real, Vec3};
+use crate::narrow_phase::Support;
+use crate::shape::{Cuboid, Descent, HeightField, LEAF, MeshSides, Shape, Slabs, TriangleMesh, box_distances};
+use crate::simd::{LaneVec3, Lanes};
+
+/// A convex part of a shape.
+pub(crate) struct Part<'a> {
+    pub support: Support<'a>,
+    /// Where it is in the frame of the shape; `None` where it is right there.
+    pub pose: Option<Pose>,
+    /// Child of a compound.
+    pub child: Option<u32>,
+    /// Triangle of a mesh, as numbered by the user, or of a height field.
+    pub triangle: Option<u32>,
+    /// Whether only its front is solid: the side from which the corners of the triangle wind counter-clockwise.
+    pub one_sided: bool,
+}
+
+impl<'a> Part<'a> {
+    fn whole(support: Support<'a>) -> Self {
+        Self { support, pose: None, child: None, triangle: None, one_sided: false }
+    }
+
+    /// The pose in the frame of the part of what `pose` places in the frame of the shape.
+    #[inline]
+    pub(crate) fn seen(&self, pose: &Pose) -> Pose {
+        self.pose.map_or(*pose, |own| own.relative(pose))
+    }
+
+    /// A point of the part's frame in that of the shape.
+    pub(crate) fn point_out(&self, point: Vec3) -> Vec3 {
+        self.pose.map_or(point, |own| own.transform_point(point))
+    }
+
+    /// A vector of the part's frame in that of the shape.
+    pub(crate) fn vector_out(&self, vector: Vec3) -> Vec3 {
+        self.pose.map_or(vector, |own| own.rotation.rotate(vector))
+    }
+
+    /// A vector of the shape's frame in that of the part.
+    pub(crate) fn vector_in(&self, vector: Vec3) -> Vec3 {
+        self.pose.map_or(vector, |own| own.rotation.inverse_rotate(vector))
+    }
+
+    /// Whether a shape whose middle is here (in the frame of the part) is pushed by the part: not from behind one that is
+    /// solid in front only. `slack` is how far behind still counts, metres.
+    pub(crate) fn faces(&self, middle: Vec3, slack: Real) -> bool {
+        match &self.support {
+            Support::Triangle([a, b, c]) if self.one_sided => {
+                let normal = (*b - *a).cross(*c - *a);
+                (middle - *a).dot(normal) >= -slack * normal.length()
+            }
+            _ => true,
+        }
+    }
+}
+
+/// Where parts are looked for, in the frame of the shape. Each visit returns a new limit; a negative one ends the search.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Region {
+    /// What overlaps a box. The limit means nothing but its sign.
+    Box(Aabb),
+    /// What a box meets that moves from `center` by up to `limit` times `displacement`.
+    Path { center: Vec3, half: Vec3, displacement: Vec3, limit: Real },
+    /// What is within the distance `limit` of a box.
+    Near { aabb: Aabb, limit: Real },
+}
+
+impl Region {
+    /// The limit to begin with.
+    pub(crate) fn limit(&self) -> Real {
+        match self {
+            Self::Box(_) => 1.0,
+            Self::Path { limit, .. } | Self::Near { limit, .. } => *limit,
+        }
+    }
+
+    /// A box around the region, for composites that look for their parts by boxes alone.
+    pub(crate) fn bounds(&self) -> Aabb {
+        match self {
+            Self::Box(aabb) => *aabb,
+            Self::Path { center, half, displacement, limit } => {
+                let way = |d: Real| if d == 0.0 { 0.0 } else { d * *limit };
+                let way = Vec3::new(way(displacement.x), way(displacement.y), way(displacement.z));
+                Aabb::from_center(*center, *half).sweep(way)
+            }
+            Self::Near { aabb, limit } => aabb.expand(*limit),
+        }
+    }
+}
+
+/// Calls `visit` with each convex part of a shape whose box meets the region, and the present limit; it returns a new one.
+pub(crate) fn visit_parts<'a>(shape: &'a Shape, region: &Region, mut visit: impl FnMut(&Part<'a>, Real) -> Real) {
+    match shape {
+        Shape::Mesh(mesh) => visit_triangles(mesh, region, &mut visit),
+        Shape::HeightField(field) => visit_field(field, region, &mut visit),
+        Shape::HalfSpace(_) => visit_half_space(region, &mut visit),
+        convex => {
+            if let Some(support) = Support::new(convex) {
+                visit(&Part::whole(support), region.limit());
+            }
+        }
+    }
+}
+
+/// The part of a half-space that the region can tell from all of it: a block below the region, larger than it.
+fn visit_half_space<'a>(region: &Region, visit: &mut impl FnMut(&Part<'a>, Real) -> Real) {
+    let bounds = region.bounds();
+    let (center, half) = (bounds.center(), bounds.half_extents());
+    let size = crate::math::min(2.0 * crate::math::max(half.max_element(), bounds.min.y.abs()) + 1.0, LARGEST_BLOCK);
+    let Ok(block) = Cuboid::new(Vec3::splat(size)) else { return };
+    if bounds.min.y <= 0.0 || matches!(region, Region::Near { .. }) {
+        let pose = Pose::from_position(Vec3::new(center.x, -size, center.z));
+        visit(&Part { pose: Some(pose), ..Part::whole(Support::Cuboid(block)) }, region.limit());
+    }
+}
+
+/// Half extent of the block that stands for a half-space where a region is endless, metres.
+const LARGEST_BLOCK: Real = 1e7;
+
+fn visit_triangles<'a>(mesh: &'a TriangleMesh, region: &Region, visit: &mut impl FnMut(&Part<'a>, Real) -> Real) {
+    match region {
+        Region::Box(aabb) => {
+            let mut limit = region.limit();
+            mesh.for_each_facet(aabb, |index| {
+                if limit >= 0.0 {
+                    limit = visit(&triangle(mesh, index), limit);
+                }
+            });
+        }
+        Region::Path { center, half, displacement, limit } => {
+            let slabs = Slabs::of_box(*center, *half, *displacement, &mesh.local_aabb());
+            mesh.descend(*limit, &mut Along { mesh, slabs, visit });
+        }
+        Region::Near { aabb, limit } => {
+            mesh.descend(*limit * *limit, &mut Around { mesh, aabb, visit });
+        }
+    }
+}
+
+fn visit_field<'a>(field: &'a HeightField, region: &Region, visit: &mut impl FnMut(&Part<'a>, Real) -> Real) {
+    let mut limit = region.limit();
+    field.for_each_facet(&region.bounds(), |index| {
+        if limit >= 0.0 {
+            let triangle = Some(index as u32);
+            let part = Part { triangle, one_sided: true, ..Part::whole(Support::Triangle(field.corners(index))) };
+            limit = visit(&part, limit);
+        }
+    });
+}
+
+fn triangle(mesh: &TriangleMesh, index: usize) -> Part<'_> {
+    Part {
+        support: Support::Triangle(mesh.corners(index)),
+        pose: None,
+        child: None,
+        triangle: Some(mesh.id(index)),
+        one_sided: mesh.sides() == MeshSides::One,
+    }
+}
+
+/// The boxes of the triangles of a leaf.
+#[inline(always)]
+fn boxes<W: Lanes<LEAF>>(mesh: &TriangleMesh, first: usize, count: usize) -> (LaneVec3<W>, LaneVec3<W>) {
+    let [a, b, c] = mesh.corners_of_leaf::<W>(first, count);
+    let low = LaneVec3 { x: a.x.min(b.x).min(c.x), y: a.y.min(b.y).min(c.y), z: a.z.min(b.z).min(c.z) };
+    let high = LaneVec3 { x: a.x.max(b.x).max(c.x), y: a.y.max(b.y).max(c.y), z: a.z.max(b.z).max(c.z) };
+    (low, high)
+}
+
+/// Lanes that are not too far, of the first `count`.
+#[inline(always)]
+fn near_lanes<W: Lanes<LEAF>>(distances: W, count: usize) -> u32 {
+    W::splat(Real::MAX).if_above(distances, W::splat(1.0), W::ZERO).positive() & ((1 << count) - 1)
+}
+
+/// Triangles that a box meets on its way.
+struct Along<'a, 'v, F> {
+    mesh: &'a TriangleMesh,
+    slabs: Slabs,
+    visit: &'v mut F,
+}
+
+impl<'a, F: FnMut(&Part<'a>, Real) -> Real> Descent for Along<'a, '_, F> {
+    #[inline(always)]
+    fn distances<W: Lanes<LEAF>>(&self, low: &LaneVec3<W>, high: &LaneVec3<W>, limit: Real) -> W {
+        self.slabs.enter(low, high, limit)
+    }
+
+    #[inline(always)]
+    fn leaf<W: Lanes<LEAF>>(&mut self, first: usize, count: usize, limit: Real) -> Real {
+        let (low, high) = boxes::<W>(self.mesh, first, count);
+        let distances = self.slabs.enter(&low, &high, limit);
+        let lanes = near_lanes(distances, count);
+        visit_near(self.mesh, first, (lanes, distances.to_array()), limit, |part, limit| (self.visit)(part, limit))
+    }
+}
+
+/// Triangles near a box.
+struct Around<'a, 'v, F> {
+    mesh: &'a TriangleMesh,
+    aabb: &'v Aabb,
+    visit: &'v mut F,
+}
+
+impl<'a, F: FnMut(&Part<'a>, Real) -> Real> Descent for Around<'a, '_, F> {
+    #[inline(always)]
+    fn distances<W: Lanes<LEAF>>(&self, low: &LaneVec3<W>, high: &LaneVec3<W>, limit: Real) -> W {
+        box_distances(self.aabb, low, high, limit)
+    }
+
+    #[inline(always)]
+    fn leaf<W: Lanes<LEAF>>(&mut self, first: usize, count: usize, limit: Real) -> Real {
+        let (low, high) = boxes::<W>(self.mesh, first, count);
+        let distances = box_distances(self.aabb, &low, &high, limit);
+        let lanes = near_lanes(distances, count);
+        visit_near(self.mesh, first, (lanes, distances.to_array()), limit, |part, limit| {
+            let limit = (self.visit)(part, limit.sqrt());
+            if limit < 0.0 { limit } else { limit * limit }
+        })
+    }
+}
+
+/// Visits the triangles of some lanes of a leaf, nearest first, and returns the last limit.
+#[inline]
+fn visit_near<'a>(
+    mesh: &'a TriangleMesh,
+    first: usize,
+    (mut lanes, distances): (u32, [Real; LEAF]),
+    limit: Real,
+    mut visit: impl FnMut(&Part<'a>, Real) -> Real,
+) -> Real {
+    let mut limit = limit;
+    while lanes != 0 && limit >= 0.0 {
+        let mut nearest = lanes.trailing_zeros() as usize % LEAF;
+        let mut others = lanes & (lanes - 1);
+        while others != 0 {
+            let lane = others.trailing_zeros() as usize % LEAF;
+            others &= others - 1;
+            if distances[lane] < distances[nearest] {
+                nearest = lane;
+            }
+        }
+        lanes &= !(1 << nearest);
+        if distances[nearest] > limit {
+            break;
+        }
+        limit = crate::math::min(visit(&triangle(mesh, first + nearest), limit), limit);
+    }
+    limit
+}
