@@ -398,9 +398,10 @@ fn touch_sphere(sphere: &Sphere, triangle: &Triangle, reach: &Reach, out: &mut C
         out.push(triangle.rim_candidate(point, normal, distance - sphere.radius(), i as u32));
         return false;
     }
-    // The neighbours have a nearer point. If rounding lost it between them, the face takes it.
+    // The neighbours have a nearer point. If rounding lost it between them, or the neighbour is another shape, the face takes
+    // it: right under the centre, for the normal of a ball goes through it (else a ball that rolls would be thrown up).
     if reach.second_look && distance < sphere.radius() {
-        out.push(triangle.face_candidate(point + triangle.normal * height, height, sphere.radius(), 0));
+        out.push(triangle.face_candidate(Vec3::ZERO, height, sphere.radius(), 0));
     }
     distance < sphere.radius()
 }
@@ -486,8 +487,7 @@ impl Capsule {
             let pair = SegmentPair::nearest(triangle.edge(i), (-end, end));
             if (pair.on_second - pair.on_first).length() < self.radius() {
                 let height = triangle.height(pair.on_second);
-                let above = pair.on_first + triangle.normal * height;
-                out.push(triangle.face_candidate(above, height, self.radius(), 8 + i as u32));
+                out.push(triangle.face_candidate(pair.on_second, height, self.radius(), 8 + i as u32));
             }
         }
     }
