@@ -123,9 +123,8 @@ fn gear_profile(teeth: usize, module: f64) -> Vec<[Real; 2]> {
         let middle = step * tooth as f64;
         let rising = flank.iter().map(|&[radius, angle]| (radius, middle - angle));
         let falling = flank.iter().rev().map(|&[radius, angle]| (radius, middle + angle));
-        let point = |(radius, angle): (f64, f64)| {
-            [(radius * libm::cos(angle)) as Real, (radius * libm::sin(angle)) as Real]
-        };
+        let point =
+            |(radius, angle): (f64, f64)| [(radius * libm::cos(angle)) as Real, (radius * libm::sin(angle)) as Real];
         profile.extend(rising.chain(falling).map(point));
     }
     profile

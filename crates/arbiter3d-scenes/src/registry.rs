@@ -261,13 +261,25 @@ pub static SCENES: &[Scene] = &[
         name: "gears",
         description: "two gears, meshes of 12 and 24 teeth: the small one drives the large one",
         size: Size::FIXED,
-        build: scenes::surfaces::gears,
+        build: scenes::gears_and_tiles::gears,
     },
     Scene {
         name: "height_field_tiles",
         description: "200 mixed bodies fall on 3 × 3 height fields side by side",
         size: Size::new("bodies", 200, 100_000),
-        build: scenes::surfaces::height_field_tiles,
+        build: scenes::gears_and_tiles::height_field_tiles,
+    },
+    Scene {
+        name: "one_way_platforms",
+        description: "ten bodies are thrown up through one-way platforms and stand each on its floor; a lift passes and carries",
+        size: Size::new("columns", 10, 100_000),
+        build: scenes::surfaces::one_way_platforms,
+    },
+    Scene {
+        name: "conveyors",
+        description: "eight boxes go round on a ring of belts, and seven skids slide along themselves on a slope",
+        size: Size::FIXED,
+        build: scenes::surfaces::conveyors,
     },
 ];
 

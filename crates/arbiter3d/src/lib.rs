@@ -45,8 +45,8 @@ pub use arbiter::{Arbiter, ArbiterId, ArbiterKey, Contact, ContactData, ContactP
 pub use query::{Ray, ShapeCast, ShapeDistance, ShapeHit, cast_ray, distance, overlaps};
 pub use shape::{
     Capsule, Cone, ConvexHull, ConvexShape, Cuboid, Custom, Cylinder, FieldDiagonals, FieldSide, HalfEdge, HalfSpace,
-    HeightField, MassProperties, MeshRayHit, MeshSides, Plane, PointCloud, Rounded, Shape, ShapeError, Sphere, TaperedCapsule, Transformed, Triangle,
-    TriangleMesh,
+    HeightField, MassProperties, MeshRayHit, MeshSides, Plane, PointCloud, Rounded, Shape, ShapeError, Sphere,
+    TaperedCapsule, Transformed, Triangle, TriangleMesh,
 };
 pub use simd::{SimdLevel, UnknownSimdLevel};
 pub use world::{

@@ -131,6 +131,20 @@ fn friction_set_before_the_solve_counts_at_once() {
     assert_near(velocity(&world, block).x, 10.0 - 0.1 * GRAVITY, 0.05, "speed after a second");
 }
 
+/// A tower stands as well when its manifolds are made anew in each step, and falls asleep.
+#[test]
+fn a_tower_that_asks_for_hooks_stands() {
+    let mut world = world();
+    floor(&mut world, 0.5);
+    let shape = ShapeDefinition::new(cube(0.5)).events(ContactEvents::PRE_SOLVE);
+    let tower: Vec<BodyId> =
+        (0..10).map(|at| add(&mut world, &BodyDefinition::dynamic().at(Vec3::Y * (at as f32 + 0.5)), &shape)).collect();
+    run(&mut world, 10.0);
+    let top = position(&world, tower[9]);
+    assert!(top.distance(Vec3::Y * 9.5) < 0.06, "the top is at {top}");
+    assert!(!world.body(tower[9]).unwrap().is_awake());
+}
+
 /// What sleeps is not asked about; the step that wakes it calls the hook again before it is solved.
 #[test]
 fn what_is_woken_in_a_step_is_shown_in_that_step() {
@@ -194,8 +208,14 @@ fn hits_of_fall(height: f32, restitution: f32, box_shaped: bool, radius: f32) ->
     let mass = world.body(body).unwrap().mass();
     let mut hits = Vec::new();
     for step in 0..240 {
+        let before = velocity(&world, body).y;
         world.step(DT).unwrap();
         hits.extend(world.hit_events().iter().map(|&hit| (step, hit)));
+        if let Some(hit) = world.hit_events().first() {
+            // Newton's second law over the step.
+            let gained = mass * (velocity(&world, body).y - before + GRAVITY * DT);
+            assert_relative(hit.impulse, gained, 0.001, "impulse");
+        }
     }
     (hits, mass)
 }
@@ -212,7 +232,14 @@ fn a_falling_ball_hits_with_the_speed_and_impulse_of_its_fall() {
                 let what = format!("height {height}, restitution {restitution}, box {box_shaped}");
                 assert!(!hits.is_empty(), "{what}: no hit");
                 let (_, first) = hits[0];
-                assert!(first.point.distance(Vec3::new(1.0, 0.0, -2.0)) < 0.01, "{what}: at {}", first.point);
+                // The corners of a box share the blow nearly, not quite, alike.
+                let off = first.point.distance(Vec3::new(1.0, 0.0, -2.0));
+                assert!(off < if box_shaped { 0.05 } else { 0.01 }, "{what}: at {}", first.point);
+                // From the blow to the end of the step the floor bears the weight as well.
+                let rest = (hits[0].0 as f32 + 1.0) * DT - speed / GRAVITY;
+                let impulse = mass * (speed * (1.0 + restitution) + GRAVITY * rest);
+                // A box that came in deep in one step is pushed out by a little more.
+                assert_relative(first.impulse, impulse, if box_shaped { 0.03 } else { 0.02 }, &what);
                 assert!((first.normal - Vec3::Y).length() < 1e-3 && first.body1 == BodyId::WORLD, "{what}");
                 let mut expected = Vec::new();
                 while speed > 1.0 {
@@ -225,11 +252,8 @@ fn a_falling_ball_hits_with_the_speed_and_impulse_of_its_fall() {
                     assert_relative(hit.speed, speed, 0.01, &what);
                     // For what is left of the step, the floor bears the weight too.
                     let (blow, weight) = (mass * speed * (1.0 + restitution), mass * GRAVITY * DT);
-                    let range = 0.98 * blow..1.02 * blow + weight;
+                    let range = 0.98 * blow..if box_shaped { 1.03 } else { 1.02 } * blow + weight;
                     assert!(range.contains(&hit.impulse), "{what}: {} N s, not {blow}", hit.impulse);
-                    if speed > 9.0 {
-                        assert_relative(hit.impulse, blow, 0.02, &what);
-                    }
                 }
             }
         }

@@ -1,4 +1,4 @@
-//! The same bits for any number of threads and any SIMD level: six scenes against checked-in hashes.
+//! The same bits for any number of threads and any SIMD level: seven scenes against checked-in hashes.
 //!
 //! The state hash is taken after each tenth step and folded into one number a scene. After a change that is meant to alter
 //! results, print the new table with
@@ -13,19 +13,20 @@ mod common;
 
 use arbiter3d::math::Vec3;
 use arbiter3d::{
-    ArbiterKey, BodyDefinition, BodyId, BodyKind, ContactPoint, ContactProvider, LockedAxes, Shape, ShapeDefinition,
-    SimdLevel, StepContext, World, WorldSettings,
+    ArbiterKey, BodyDefinition, BodyId, BodyKind, ContactEvents, ContactPoint, ContactProvider, LockedAxes, Shape,
+    ShapeDefinition, SimdLevel, StepContext, World, WorldSettings,
 };
 use common::*;
 
 /// The hashes of the scenes, in their order.
-const GOLDEN: [(&str, u64); 6] = [
+const GOLDEN: [(&str, u64); 7] = [
     ("pile", 0xaac7_fc32_c6dd_5cd4),
     ("hulls", 0x7d4f_1a72_0999_6ad2),
     ("mesh rain", 0xbbc5_9568_a34d_b749),
     ("bullets", 0x2095_d005_d124_c013),
     ("custom contacts", 0xf4d2_df3a_d912_e6b7),
     ("coming and going", 0x8fe6_cf19_2475_ff5b),
+    ("surfaces", 0x75da_f17e_e1a8_66ff),
 ];
 
 /// A scene: how it begins, and what is done before each step.
@@ -36,13 +37,14 @@ struct Scene {
     before_step: fn(&mut World, usize),
 }
 
-const SCENES: [Scene; 6] = [
+const SCENES: [Scene; 7] = [
     Scene { name: "pile", steps: 180, build: pile, before_step: |_, _| {} },
     Scene { name: "hulls", steps: 150, build: hulls, before_step: |_, _| {} },
     Scene { name: "mesh rain", steps: 180, build: mesh_rain, before_step: |_, _| {} },
     Scene { name: "bullets", steps: 120, build: bullets, before_step: shoot },
     Scene { name: "custom contacts", steps: 180, build: custom_contacts, before_step: |_, _| {} },
     Scene { name: "coming and going", steps: 300, build: coming_and_going, before_step: come_and_go },
+    Scene { name: "surfaces", steps: 180, build: surfaces, before_step: ask_for_surfaces },
 ];
 
 /// Bodies of all shapes on a lattice over the origin, each turned and moving at random.
@@ -188,6 +190,44 @@ fn come_and_go(world: &mut World, step: usize) {
     add(world, &body, &ShapeDefinition::new(random.shape()));
 }
 
+/// Bodies of all shapes, some with easy friction one way, are thrown up through one-way platforms, of which one moves,
+/// and fall on belts, of which one turns. Hooks make ice of every third contact.
+fn surfaces(world: &mut World) {
+    let belt = ShapeDefinition::new(cuboid(6.0, 1.0, 12.0)).friction(0.8);
+    let fixed = BodyDefinition::fixed().at(Vec3::new(-6.0, -1.0, 0.0));
+    add(world, &fixed, &belt.clone().tangent_velocity(Vec3::X * 2.0));
+    let turning = BodyDefinition::kinematic().at(Vec3::new(6.0, -1.0, 0.0)).moving(Vec3::ZERO, Vec3::Y * 0.3);
+    add(world, &turning, &belt.tangent_velocity(Vec3::Z * -1.5));
+    let platform = ShapeDefinition::new(cuboid(5.0, 0.1, 5.0)).one_way(Vec3::Y);
+    add(world, &BodyDefinition::fixed().at(Vec3::Y * 2.5), &platform);
+    add(world, &BodyDefinition::kinematic().at(Vec3::Y * 4.0).moving(Vec3::Y * -0.5, Vec3::ZERO), &platform);
+    let gate = BodyDefinition::fixed().at(Vec3::Y * 2.0);
+    add(world, &gate, &ShapeDefinition::new(cuboid(3.0, 1.0, 3.0)).sensor());
+    let mut random = Random(47);
+    for at in 0..200 {
+        let place = Vec3::new((at % 10) as f32 - 4.5, (at / 100) as f32 + 0.7, (at / 10 % 10) as f32 - 4.5) * 1.05;
+        let body = BodyDefinition::dynamic().at(place).rotated(random.rotation());
+        let body = body.moving(random.vector(2.0) + Vec3::Y * 9.0, random.vector(3.0));
+        let shape = ShapeDefinition::new(random.shape()).restitution(0.2);
+        let shape = if at % 2 == 0 { shape.anisotropy(Vec3::X, 0.1) } else { shape };
+        let events = if at % 3 == 0 { ContactEvents::ALL } else { ContactEvents::NONE };
+        add(world, &body, &shape.events(events));
+    }
+    world.on_pre_solve(Box::new(|context, id| {
+        if let Some(arbiter) = context.arbiter_mut(id) {
+            arbiter.data_mut().set_friction(0.05).unwrap();
+        }
+    }));
+}
+
+/// The hits of a step push bodies in the next one: the order and numbers of the events are part of the hash.
+fn ask_for_surfaces(world: &mut World, _: usize) {
+    let hits: Vec<(BodyId, f32)> = world.hit_events().iter().map(|hit| (hit.body2, hit.impulse)).collect();
+    for (body, impulse) in hits {
+        let _ = world.body_mut(body).unwrap().apply_impulse(Vec3::new(0.1, 0.0, -0.1) * impulse);
+    }
+}
+
 fn settings(threads: usize, simd: SimdLevel) -> WorldSettings {
     WorldSettings { threads, simd: Some(simd), ..WorldSettings::default() }
 }
@@ -288,10 +328,16 @@ fn golden_coming_and_going() {
     check(5);
 }
 
+/// One-way platforms, belts, friction that differs along a direction, hooks and hits.
+#[test]
+fn golden_surfaces() {
+    check(6);
+}
+
 /// The scenes do what they are for: they have contacts, sleepers and motion.
 #[test]
 fn the_scenes_are_worth_hashing() {
-    for (scene, contacts) in SCENES.iter().zip([500, 300, 400, 50, 150, 100]) {
+    for (scene, contacts) in SCENES.iter().zip([500, 300, 400, 50, 150, 100, 150]) {
         let mut world = World::new(settings(1, SimdLevel::best())).unwrap();
         let hashes = play(&mut world, scene);
         let found = world.contact_count();

@@ -3,7 +3,9 @@
 mod common;
 
 use arbiter3d::math::Vec3;
-use arbiter3d::{BodyDefinition, BodyId, BodyKind, Error, MeshSides, Shape, ShapeDefinition, ShapeError, TriangleMesh, World};
+use arbiter3d::{
+    BodyDefinition, BodyId, BodyKind, Error, MeshSides, Shape, ShapeDefinition, ShapeError, TriangleMesh, World,
+};
 use common::*;
 
 /// A grid of `cells` × `cells` squares of this size about the origin, solid from above.
@@ -207,7 +209,10 @@ fn meshes_do_not_go_on_dynamic_bodies() {
     assert_eq!(world.add_shape(body, &mesh), Err(Error::Shape(ShapeError::OpenMesh { edges: 8 })));
     let fixed = world.add_body(&BodyDefinition::fixed()).unwrap();
     world.add_shape(fixed, &mesh).unwrap();
-    assert_eq!(world.body_mut(fixed).unwrap().set_kind(BodyKind::Dynamic), Err(Error::Shape(ShapeError::OpenMesh { edges: 8 })));
+    assert_eq!(
+        world.body_mut(fixed).unwrap().set_kind(BodyKind::Dynamic),
+        Err(Error::Shape(ShapeError::OpenMesh { edges: 8 }))
+    );
     assert_eq!(world.body(fixed).unwrap().kind(), BodyKind::Static);
     world.body_mut(fixed).unwrap().set_kind(BodyKind::Kinematic).unwrap();
 }

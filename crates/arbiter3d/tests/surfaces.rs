@@ -59,10 +59,8 @@ fn material(friction: f32) -> Material {
 fn a_box_slides_from_ice_to_rubber() {
     let materials = (0..40 * 40).map(|cell| u8::from(cell % 40 >= 20)).collect();
     let field = HeightField::new(vec![0.0; 41 * 41], 41, [1.0; 2]).unwrap().with_materials(materials).unwrap();
-    let floors = [
-        (mesh_of_two_materials(20.0), Vec3::ZERO),
-        (Shape::HeightField(field.into()), Vec3::new(-20.0, 0.0, -20.0)),
-    ];
+    let floors =
+        [(mesh_of_two_materials(20.0), Vec3::ZERO), (Shape::HeightField(field.into()), Vec3::new(-20.0, 0.0, -20.0))];
     for (floor, place) in floors {
         let mut world = sleepless();
         let palette = vec![material(0.0), material(0.8)];
@@ -109,8 +107,7 @@ fn closed_meshes_have_the_mass_of_what_they_enclose() {
     let c = moved.mass_properties(700.0).unwrap();
     assert_relative(a.mass, b.mass, 1e-6, "mass");
     assert!(a.center.length() < 1e-6 && c.center.distance(Vec3::new(3.0, -2.0, 1.0)) < 1e-6);
-    for (found, expected) in
-        [(a.inertia.xx, b.inertia.xx), (a.inertia.yy, b.inertia.yy), (a.inertia.zz, b.inertia.zz)]
+    for (found, expected) in [(a.inertia.xx, b.inertia.xx), (a.inertia.yy, b.inertia.yy), (a.inertia.zz, b.inertia.zz)]
     {
         assert_relative(found, expected, 1e-5, "inertia");
     }
@@ -235,7 +232,12 @@ fn a_torus_hangs_on_a_rod() {
 /// A mirrored and stretched mesh faces outwards as before: contacts are the mirror image, and its mass is right.
 #[test]
 fn a_mirrored_mesh_is_its_mirror_image() {
-    let corners = vec![Vec3::new(-2.0, 0.0, -2.0), Vec3::new(-2.0, 0.3, 2.0), Vec3::new(2.0, 0.5, -2.0), Vec3::new(2.0, 1.4, 2.0)];
+    let corners = vec![
+        Vec3::new(-2.0, 0.0, -2.0),
+        Vec3::new(-2.0, 0.3, 2.0),
+        Vec3::new(2.0, 0.5, -2.0),
+        Vec3::new(2.0, 1.4, 2.0),
+    ];
     let mesh = Shape::mesh(corners, vec![[0, 1, 2], [2, 1, 3]]).unwrap();
     let mirrored = mesh.scaled(Vec3::new(-1.0, 1.0, 1.0)).unwrap();
     let flip = |v: Vec3| Vec3::new(-v.x, v.y, v.z);

@@ -1,57 +1,73 @@
-//! Meshes that move, and ground made of tiles.
+//! Surfaces that do something: platforms to be passed one way, belts, and skids.
 
-use crate::builder::{Builder, Mixed, plain};
-use crate::turns::{about, sin_cos};
-use crate::{BuiltScene, SceneOptions, meshes};
+use crate::builder::{Builder, Mixed};
+use crate::turns::{about, then};
+use crate::{BuiltScene, SceneOptions};
 use arbiter3d::{
-    BodyDefinition, BodyId, Error, LockedAxes, Shape, ShapeDefinition, WorldSettings,
-    math::{Real, Vec3},
+    BodyDefinition, Error, Shape, ShapeDefinition,
+    math::{Real, Rotation, Vec3},
 };
-use std::f32::consts::PI;
 
-/// Two gears with involute teeth, 12 and 24, on two shafts: the small one is driven at 2 rad/s, the large one turns half as
-/// fast the other way.
-pub(crate) fn gears(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
-    const MODULE: Real = 0.1;
-    let settings = WorldSettings { gravity: Vec3::ZERO, allow_sleep: false, ..WorldSettings::default() };
-    let mut scene = Builder::with_settings(options, size, settings)?;
-    let gear = |teeth: usize, half_width: Real| -> Result<ShapeDefinition, Error> {
-        let (corners, triangles) = meshes::gear(teeth, MODULE, half_width);
-        Ok(ShapeDefinition::new(Shape::mesh(corners, triangles)?).friction(0.1))
-    };
-    let driver = BodyDefinition::kinematic().moving(Vec3::ZERO, Vec3::Z * 2.0);
-    scene.add(&driver, &gear(12, 0.12)?)?;
-    // The distance of the pitch circles; a gap of the large gear meets the tooth of the small one on the line between them.
-    let place = Vec3::new(0.5 * MODULE * 36.0, 0.0, 0.0);
-    let driven = BodyDefinition {
-        locked_axes: LockedAxes::TRANSLATION | LockedAxes::ROTATION_X | LockedAxes::ROTATION_Y,
-        angular_damping: 0.2,
-        ..BodyDefinition::dynamic().at(place).rotated(about(Vec3::Z, PI / 24.0))
-    };
-    scene.add(&driven, &gear(24, 0.1)?)?;
-    scene.finish(300)
+/// Platforms in a column of [`one_way_platforms`].
+const FLOORS: usize = 5;
+/// From one to the next, metres.
+const STOREY: Real = 3.0;
+
+/// Columns of five one-way platforms. A body is thrown up through each and comes to stand on the next higher floor than
+/// its left neighbour; beside them a lift rises through what lies on the ground and carries what stands on it.
+pub(crate) fn one_way_platforms(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
+    let mut scene = Builder::sleepless(options, size)?;
+    scene.ground(Vec3::new(10.0 + 2.0 * size as Real, 1.0, 10.0))?;
+    let mixed = Mixed::new(&mut scene.random(7))?.resisting_to_roll();
+    let slab = ShapeDefinition::new(Shape::cuboid(Vec3::new(1.4, 0.1, 1.4))?).friction(1.0).one_way(Vec3::Y);
+    for column in 0..size {
+        let x = 3.0 * (column as Real - 0.5 * (size as Real - 1.0));
+        for floor in 1..=FLOORS {
+            let body = BodyDefinition::fixed().at(Vec3::new(x, STOREY * floor as Real - 0.1, 0.0));
+            scene.add(&body, &slab)?;
+        }
+        // Its middle comes 1.3 m above the floor that it is to stand on.
+        let rise = STOREY * (1 + column % FLOORS) as Real + 1.3 - 0.6;
+        let thrown = BodyDefinition::dynamic().at(Vec3::new(x, 0.6, 0.0));
+        scene.add(&thrown.moving(Vec3::Y * (2.0 * 9.81 * rise).sqrt(), Vec3::ZERO), mixed.get(column))?;
+    }
+    let lift = Vec3::new(0.0, -0.5, 5.0);
+    scene.add(&BodyDefinition::kinematic().at(lift).moving(Vec3::Y, Vec3::ZERO), &slab)?;
+    let cube = ShapeDefinition::new(Shape::cuboid(Vec3::splat(0.4))?);
+    scene.drop(lift + Vec3::new(-0.7, 1.5, 0.0), &cube)?;
+    scene.finish(360)
 }
 
-/// 3 × 3 height fields of 16 m side by side, 200 bodies that fall on them.
-pub(crate) fn height_field_tiles(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
-    const CELLS: usize = 32;
-    const CELL: Real = 0.5;
-    let mut scene = Builder::new(options, size)?;
-    let width = CELLS as Real * CELL;
-    let wave = |x: Real, z: Real| 0.8 * sin_cos(0.4 * x).0 * sin_cos(0.3 * z).0;
-    for tile in 0..9 {
-        let (x, z) = (width * ((tile % 3) as Real - 1.5), width * ((tile / 3) as Real - 1.5));
-        let at = |i: usize| (x + CELL * (i % (CELLS + 1)) as Real, z + CELL * (i / (CELLS + 1)) as Real);
-        let heights = (0..(CELLS + 1) * (CELLS + 1)).map(|i| wave(at(i).0, at(i).1)).collect();
-        let field = plain(Shape::height_field(heights, CELLS + 1, [CELL; 2])?);
-        scene.world.add_shape(BodyId::WORLD, &field.at(Vec3::new(x, 0.0, z)))?;
+/// Half a side of the ring of belts of [`conveyors`].
+const RING: Real = 4.0;
+
+/// Eight boxes go round on a ring of four belts at 2 m/s, and seven skids with a tenth of the friction along their own
+/// axis lie on a slope of 30°, each turned by 15° more: the first runs straight down, the last sticks.
+pub(crate) fn conveyors(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
+    let mut scene = Builder::sleepless(options, size)?;
+    scene.ground(Vec3::new(60.0, 1.0, 60.0))?;
+    let belt = ShapeDefinition::new(Shape::cuboid(Vec3::new(RING, 0.5, 1.0))?).tangent_velocity(Vec3::X * 2.0);
+    let cube = ShapeDefinition::new(Shape::cuboid(Vec3::splat(0.25))?);
+    for side in 0..4 {
+        let turn = about(Vec3::Y, -std::f32::consts::FRAC_PI_2 * side as Real);
+        let rotation = Rotation::from_quat(turn);
+        // Each belt ends where it meets the side of the next one.
+        let place = rotation.rotate(Vec3::new(-1.0, 0.5, -RING));
+        scene.add(&BodyDefinition::fixed().at(place).rotated(turn), &belt)?;
+        for x in [-3.0, 0.0] {
+            scene.drop(rotation.rotate(Vec3::new(x, 1.25, -RING)), &cube)?;
+        }
     }
-    let mut random = scene.random(1);
-    let kinds = Mixed::new(&mut random)?.resisting_to_roll();
-    for index in 0..scene.size {
-        let place = |k: usize| 1.3 * (k as Real - 7.0);
-        let height = 2.0 + 0.01 * index as Real;
-        scene.drop(Vec3::new(place(index % 15), height, place(index / 15 % 15)), kinds.get(index))?;
+    let slope = about(Vec3::Z, -30.0_f32.to_radians());
+    let tilt = Rotation::from_quat(slope);
+    let (foot, normal) = (Vec3::new(0.0, 20.0, -25.0), tilt.rotate(Vec3::Y));
+    let ramp = ShapeDefinition::new(Shape::cuboid(Vec3::new(30.0, 1.0, 15.0))?).friction(0.8);
+    scene.add(&BodyDefinition::fixed().at(foot - normal).rotated(slope), &ramp)?;
+    let skid = ShapeDefinition::new(Shape::cuboid(Vec3::new(0.6, 0.1, 0.3))?).friction(0.8).anisotropy(Vec3::X, 0.1);
+    for index in 0..=6 {
+        let turn = then(about(Vec3::Y, (15.0 * index as Real).to_radians()), slope);
+        let place = foot + normal * 0.1 + tilt.rotate(Vec3::new(-20.0, 0.0, 3.5 * (index as Real - 3.0)));
+        scene.add(&BodyDefinition::dynamic().at(place).rotated(turn), &skid)?;
     }
     scene.finish(600)
 }

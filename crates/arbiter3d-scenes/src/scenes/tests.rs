@@ -37,6 +37,8 @@ fn scenes_have_their_published_counts() {
         ("ramps", None, 11),
         ("bounce", None, 11),
         ("t_handle", None, 1),
+        ("one_way_platforms", None, 11),
+        ("conveyors", None, 15),
         ("gears", None, 1),
         ("height_field_tiles", None, 200),
     ];

@@ -7,7 +7,7 @@
 //! two shapes as wholes. A one-sided triangle stops only shapes whose middle is in front of it when they touch, as in contacts.
 
 use super::pair::deepest_contact;
-use super::parts::{Part, Region, visit_parts};
+use super::parts::{Part, Path, Region, Solid, visit_parts};
 use crate::math::{Pose, Real, Vec3, normalize_or};
 use crate::narrow_phase::{Cast, CastPoint, Support, Sweep, closest, linear_cast, time_of_impact};
 use crate::shape::Shape;
@@ -137,6 +137,25 @@ impl<'a> Mover<'a> {
         }
     }
 
+    /// Its way in a frame.
+    fn path(&self, frame: &Pose, limit: Real) -> Path {
+        let (center, half) = self.bounds_from(frame);
+        let start = frame.relative(&self.start);
+        let solid = if self.turns {
+            Solid { radius: self.reach, ..Solid::point(center) }
+        } else {
+            let (half, radius) = match self.shape {
+                Shape::Sphere(ball) => (Vec3::ZERO, ball.radius()),
+                Shape::Capsule(capsule) => (Vec3::Y * capsule.half_length(), capsule.radius()),
+                other => (other.local_aabb().half_extents(), 0.0),
+            };
+            let axes = start.rotation.to_mat3();
+            let edges = [axes.x_axis * half.x, axes.y_axis * half.y, axes.z_axis * half.z];
+            Solid { middle: start.transform_point(self.middle), edges, radius, is_rigid: true }
+        };
+        Path { center, half, displacement: frame.rotation.inverse_rotate(self.displacement), limit, solid }
+    }
+
     /// How far it goes.
     pub(crate) fn displacement(&self) -> Vec3 {
         self.displacement
@@ -144,9 +163,8 @@ impl<'a> Mover<'a> {
 
     /// Where it first touches a shape placed in the world by `pose`, up to the share `limit` of its way.
     pub(crate) fn cast(&self, shape: &Shape, pose: &Pose, limit: Real) -> Option<Impact> {
-        let (center, half) = self.bounds_from(pose);
-        let displacement = pose.rotation.inverse_rotate(self.displacement);
-        let region = Region::Path { center, half, displacement, limit };
+        let path = self.path(pose, limit);
+        let displacement = path.displacement;
         let mut search = Search {
             mover: self,
             start: pose.relative(&self.start),
@@ -157,12 +175,12 @@ impl<'a> Mover<'a> {
         };
         match &self.parts {
             Parts::One(support) => {
-                visit_parts(shape, &region, |part, limit| search.visit(part, (support, None), limit));
+                visit_parts(shape, &Region::Path(path), |part, limit| search.visit(part, (support, None), limit));
             }
             Parts::Many(parts) => {
                 for (support, own) in parts {
                     let reach = search.best.map_or(limit, |(hit, ..)| hit.fraction);
-                    let region = Region::Path { center, half, displacement, limit: reach };
+                    let region = Region::Path(Path { limit: reach, ..path });
                     visit_parts(shape, &region, |part, limit| search.visit(part, (support, Some(own)), limit));
                 }
             }

@@ -5,7 +5,7 @@
 //! [`Support`]. A new kind of composite needs one arm in [`visit_parts`], which hands over every part whose box the region
 //! meets: nearest first if it has a tree of its own, else in any order.
 
-use crate::math::{Aabb, Pose, Real, Vec3};
+use crate::math::{Aabb, Pose, Real, Vec3, abs3, max, max3, min};
 use crate::narrow_phase::Support;
 use crate::shape::{Cuboid, Descent, HeightField, LEAF, MeshSides, Shape, Slabs, TriangleMesh, box_distances};
 use crate::simd::{LaneVec3, Lanes};
@@ -62,13 +62,48 @@ impl<'a> Part<'a> {
     }
 }
 
+/// A way through space: a box and, inside of it, a solid that move by up to `limit` times the displacement.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Path {
+    /// Middle of the box at the start.
+    pub center: Vec3,
+    /// Half extents of the box.
+    pub half: Vec3,
+    pub displacement: Vec3,
+    pub limit: Real,
+    pub solid: Solid,
+}
+
+/// A turned box grown by a radius, around what moves.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Solid {
+    /// Its middle at the start.
+    pub middle: Vec3,
+    /// Half of its edges.
+    pub edges: [Vec3; 3],
+    pub radius: Real,
+    /// Whether what moves keeps its middle there: then a one-sided triangle behind which it starts and stays is no part.
+    pub is_rigid: bool,
+}
+
+impl Solid {
+    /// A point.
+    pub(crate) fn point(at: Vec3) -> Self {
+        Self { middle: at, edges: [Vec3::ZERO; 3], radius: 0.0, is_rigid: false }
+    }
+
+    fn reach(&self) -> Real {
+        self.radius + self.edges[0].length() + self.edges[1].length() + self.edges[2].length()
+    }
+}
+
 /// Where parts are looked for, in the frame of the shape. Each visit returns a new limit; a negative one ends the search.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Region {
     /// What overlaps a box. The limit means nothing but its sign.
     Box(Aabb),
-    /// What a box meets that moves from `center` by up to `limit` times `displacement`.
-    Path { center: Vec3, half: Vec3, displacement: Vec3, limit: Real },
+    /// What something meets on its way.
+    Path(Path),
     /// What is within the distance `limit` of a box.
     Near { aabb: Aabb, limit: Real },
 }
@@ -78,7 +113,20 @@ impl Region {
     pub(crate) fn limit(&self) -> Real {
         match self {
             Self::Box(_) => 1.0,
-            Self::Path { limit, .. } | Self::Near { limit, .. } => *limit,
+            Self::Path(path) => path.limit,
+            Self::Near { limit, .. } => *limit,
+        }
+    }
+
+    /// Whether the region, with this limit, meets a box.
+    pub(crate) fn meets(&self, aabb: &Aabb, limit: Real) -> bool {
+        match self {
+            Self::Box(wanted) => wanted.overlaps(aabb),
+            Self::Path(path) => path.meets(aabb, limit),
+            Self::Near { aabb: near, .. } => {
+                let gap = max3(max3(near.min - aabb.max, aabb.min - near.max), Vec3::ZERO);
+                gap.length_squared() <= limit * limit * (1.0 + 1e-6)
+            }
         }
     }
 
@@ -86,13 +134,36 @@ impl Region {
     pub(crate) fn bounds(&self) -> Aabb {
         match self {
             Self::Box(aabb) => *aabb,
-            Self::Path { center, half, displacement, limit } => {
+            Self::Path(Path { center, half, displacement, limit, .. }) => {
                 let way = |d: Real| if d == 0.0 { 0.0 } else { d * *limit };
                 let way = Vec3::new(way(displacement.x), way(displacement.y), way(displacement.z));
                 Aabb::from_center(*center, *half).sweep(way)
             }
             Self::Near { aabb, limit } => aabb.expand(*limit),
         }
+    }
+}
+
+impl Path {
+    /// Whether the moving box meets a box by `limit`; more often rather than less.
+    fn meets(&self, aabb: &Aabb, limit: Real) -> bool {
+        let slack = 1e-6 * (aabb.farthest_from(Vec3::ZERO) + abs3(self.center)) + 1e-5 * self.half;
+        let reach = self.half + slack;
+        let (low, high) = (aabb.min - self.center - reach, aabb.max - self.center + reach);
+        let (mut enter, mut leave) = (0.0, limit);
+        for axis in 0..3 {
+            let rate = self.displacement[axis];
+            if rate == 0.0 {
+                if low[axis] > 0.0 || high[axis] < 0.0 {
+                    return false;
+                }
+                continue;
+            }
+            let (near, far) = if rate > 0.0 { (low[axis], high[axis]) } else { (high[axis], low[axis]) };
+            enter = max(near / rate, enter);
+            leave = min(far / rate, leave);
+        }
+        enter <= leave * (1.0 + 1e-6)
     }
 }
 
@@ -103,8 +174,11 @@ pub(crate) fn visit_parts<'a>(shape: &'a Shape, region: &Region, mut visit: impl
         Shape::HeightField(field) => visit_field(field, region, &mut visit),
         Shape::HalfSpace(_) => visit_half_space(region, &mut visit),
         convex => {
-            if let Some(support) = Support::new(convex) {
-                visit(&Part::whole(support), region.limit());
+            let limit = region.limit();
+            if region.meets(&convex.local_aabb(), limit)
+                && let Some(support) = Support::new(convex)
+            {
+                visit(&Part::whole(support), limit);
             }
         }
     }
@@ -135,9 +209,9 @@ fn visit_triangles<'a>(mesh: &'a TriangleMesh, region: &Region, visit: &mut impl
                 }
             });
         }
-        Region::Path { center, half, displacement, limit } => {
-            let slabs = Slabs::of_box(*center, *half, *displacement, &mesh.local_aabb());
-            mesh.descend(*limit, &mut Along { mesh, slabs, visit });
+        Region::Path(path) => {
+            let slabs = Slabs::of_box(path.center, path.half, path.displacement, &mesh.local_aabb());
+            mesh.descend(path.limit, &mut Along { mesh, path, slabs, visit });
         }
         Region::Near { aabb, limit } => {
             mesh.descend(*limit * *limit, &mut Around { mesh, aabb, visit });
@@ -166,10 +240,9 @@ fn triangle(mesh: &TriangleMesh, index: usize) -> Part<'_> {
     }
 }
 
-/// The boxes of the triangles of a leaf.
+/// The boxes of triangles.
 #[inline(always)]
-fn boxes<W: Lanes<LEAF>>(mesh: &TriangleMesh, first: usize, count: usize) -> (LaneVec3<W>, LaneVec3<W>) {
-    let [a, b, c] = mesh.corners_of_leaf::<W>(first, count);
+fn boxes<W: Lanes<LEAF>>([a, b, c]: &[LaneVec3<W>; 3]) -> (LaneVec3<W>, LaneVec3<W>) {
     let low = LaneVec3 { x: a.x.min(b.x).min(c.x), y: a.y.min(b.y).min(c.y), z: a.z.min(b.z).min(c.z) };
     let high = LaneVec3 { x: a.x.max(b.x).max(c.x), y: a.y.max(b.y).max(c.y), z: a.z.max(b.z).max(c.z) };
     (low, high)
@@ -184,6 +257,7 @@ fn near_lanes<W: Lanes<LEAF>>(distances: W, count: usize) -> u32 {
 /// Triangles that a box meets on its way.
 struct Along<'a, 'v, F> {
     mesh: &'a TriangleMesh,
+    path: &'v Path,
     slabs: Slabs,
     visit: &'v mut F,
 }
@@ -196,10 +270,51 @@ impl<'a, F: FnMut(&Part<'a>, Real) -> Real> Descent for Along<'a, '_, F> {
 
     #[inline(always)]
     fn leaf<W: Lanes<LEAF>>(&mut self, first: usize, count: usize, limit: Real) -> Real {
-        let (low, high) = boxes::<W>(self.mesh, first, count);
-        let distances = self.slabs.enter(&low, &high, limit);
+        let corners = self.mesh.corners_of_leaf::<W>(first, count);
+        let (low, high) = boxes(&corners);
+        let times = self.slabs.pass(&low, &high, limit);
+        let one_sided = self.mesh.sides() == MeshSides::One;
+        let distances =
+            self.path.solid.through_planes(&corners, times, (self.path.displacement, self.slabs.slack()), one_sided);
         let lanes = near_lanes(distances, count);
         visit_near(self.mesh, first, (lanes, distances.to_array()), limit, |part, limit| (self.visit)(part, limit))
+    }
+}
+
+impl Solid {
+    /// When the solid is in the box of each triangle and in its plane, given the times at which it enters the box and leaves
+    /// it; [`Real::MAX`] where it never is in both at once, or stays behind a one-sided triangle.
+    #[inline(always)]
+    fn through_planes<W: Lanes<LEAF>>(
+        &self,
+        [a, b, c]: &[LaneVec3<W>; 3],
+        (enter, leave): (W, W),
+        (displacement, slack): (Vec3, Real),
+        one_sided: bool,
+    ) -> W {
+        let none = W::splat(Real::MAX);
+        let (ab, ac) = (*b - *a, *c - *a);
+        let normal = ab.cross(&ac);
+        let length = normal.dot(&normal).sqrt();
+        // The normal of a sliver has lost digits: what that does within reach of the triangle.
+        let size = ab.dot(&ab) + ac.dot(&ac);
+        let rounding = W::splat(4e-7) * size * (size.sqrt() + W::splat(self.reach()));
+        let mut extent = W::splat(self.radius + 2.0 * slack) * length + rounding;
+        for edge in self.edges {
+            extent += normal.dot(&LaneVec3::splat(edge)).abs();
+        }
+        let height = normal.dot(&(LaneVec3::splat(self.middle) - *a));
+        let rate = normal.dot(&LaneVec3::splat(displacement));
+        // A plane along the way is in reach all the time (−∞ to ∞) or never (twice the same infinity).
+        let (first, second) = ((-height - extent) / rate, (extent - height) / rate);
+        let enter = first.min(second).max(enter);
+        let leave = first.max(second).min(leave);
+        let mut found = enter.if_above(leave * W::splat(1.0 + 1e-5), none, enter);
+        if one_sided && self.is_rigid {
+            let stays_behind = rate.if_positive(W::ZERO, -height - extent * W::splat(0.01));
+            found = stays_behind.if_positive(none, found);
+        }
+        found
     }
 }
 
@@ -218,7 +333,7 @@ impl<'a, F: FnMut(&Part<'a>, Real) -> Real> Descent for Around<'a, '_, F> {
 
     #[inline(always)]
     fn leaf<W: Lanes<LEAF>>(&mut self, first: usize, count: usize, limit: Real) -> Real {
-        let (low, high) = boxes::<W>(self.mesh, first, count);
+        let (low, high) = boxes(&self.mesh.corners_of_leaf::<W>(first, count));
         let distances = box_distances(self.aabb, &low, &high, limit);
         let lanes = near_lanes(distances, count);
         visit_near(self.mesh, first, (lanes, distances.to_array()), limit, |part, limit| {

@@ -13,7 +13,7 @@
 //!   clipping", 1978.
 //! - *Everything else:* GJK on the parts of the shape.
 
-use super::parts::{Region, visit_parts};
+use super::parts::{Path, Region, Solid, visit_parts};
 use crate::math::{Pose, Real, Vec3};
 use crate::narrow_phase::{Cast, Support, linear_cast};
 use crate::shape::{Capsule, Cuboid, Plane, Shape};
@@ -121,8 +121,9 @@ pub(crate) fn cast_parts(shape: &Shape, ray: &Ray) -> Option<PartHit> {
     let start = Pose::from_position(ray.origin);
     let size = shape.local_aabb().half_extents().length();
     let mut best: Option<PartHit> = None;
-    let region =
-        Region::Path { center: ray.origin, half: Vec3::ZERO, displacement: ray.direction, limit: ray.max_fraction };
+    let (center, displacement, limit) = (ray.origin, ray.direction, ray.max_fraction);
+    let solid = Solid::point(center);
+    let region = Region::Path(Path { center, half: Vec3::ZERO, displacement, limit, solid });
     visit_parts(shape, &region, |part, limit| {
         let direction = part.vector_in(ray.direction);
         let hit = match linear_cast((&part.support, &probe), &part.seen(&start), direction, limit, size) {

@@ -266,7 +266,7 @@ impl HeightField {
     /// at the same distance the one with the smallest number is reported.
     #[must_use]
     pub fn cast_ray(&self, origin: Vec3, direction: Vec3, limit: Real) -> Option<MeshRayHit> {
-        let sharp = SharpRay::new(origin, direction)?;
+        let sharp = SharpRay::new(origin, direction, &self.around)?;
         let mut walk = FieldRay::new(self, sharp, origin, direction, limit);
         let top = self.levels.len();
         walk.cross(top, [0, 0], [self.columns, self.rows]);
@@ -354,7 +354,9 @@ impl HeightField {
             Side::Diagonal => return Some(index ^ 1),
             Side::Outer(FieldSide::LowX) => (i > 0).then(|| 2 * (cell - 1) + 1),
             Side::Outer(FieldSide::HighX) => (i + 1 < self.columns).then(|| 2 * (cell + 1)),
-            Side::Outer(FieldSide::LowZ) => (j > 0).then(|| 2 * (cell - self.columns) + 1 - rising(cell - self.columns)),
+            Side::Outer(FieldSide::LowZ) => {
+                (j > 0).then(|| 2 * (cell - self.columns) + 1 - rising(cell - self.columns))
+            }
             Side::Outer(FieldSide::HighZ) => {
                 (j + 1 < self.rows).then(|| 2 * (cell + self.columns) + rising(cell + self.columns))
             }

@@ -53,7 +53,7 @@ fn rays_hit_what_brute_force_hits() {
                 3 => (from, corner),
                 _ => (from + Vec3::Y * 3.0, from + random.vector() - Vec3::Y * 3.0),
             };
-            let Some(ray) = SharpRay::new(origin, to - origin) else { continue };
+            let Some(ray) = SharpRay::new(origin, to - origin, &field.around) else { continue };
             let tried = all.iter().filter_map(|&t| {
                 let hit = ray.hit(&field.corners(t), MeshSides::One)?;
                 (hit.0 <= 1.5).then_some((hit.0, t as u32))

@@ -7,10 +7,10 @@
 //! a point inside, which is then moved to the middle between what is left and right, above and below, before and behind it.
 //! The nearest triangle tells how large the ball about it may be; the largest ball counts.
 
+use super::MassProperties;
 use super::mass::Moments;
 use super::mesh::{MeshSides, TriangleMesh};
 use super::mesh_tree::{Descent, LEAF, box_distances};
-use super::MassProperties;
 use crate::math::{Aabb, Real, Vec3, clamp, min};
 use crate::simd::{LaneVec3, Lanes};
 

@@ -9,7 +9,7 @@
 //! Source of the wide tree: Wald, Benthin, Boulos, "Getting Rid of Packets", 2008.
 
 use super::mesh_tree_builder::Builder;
-use crate::math::{Aabb, Real, Vec3};
+use crate::math::{Aabb, Real, Vec3, abs3};
 use crate::simd::{KernelOfEight, LaneVec3, Lanes, Number, Wide, run_eight};
 
 /// Children of a node.
@@ -250,30 +250,53 @@ fn keep_overlapping<W: Number>(found: W, [low, high]: [W; 2], [wanted_low, wante
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Slabs {
     origin: Vec3,
-    inverse: [Real; 3],
     half: Vec3,
+    axes: [Slab; 3],
+    slack: Real,
 }
 
-impl Slabs {
+/// An axis of a direction: its inverse for near planes and for far ones. Both are zero where the direction is.
+#[derive(Clone, Copy, Debug)]
+struct Slab {
+    near: Real,
+    far: Real,
+}
+
+impl Slab {
     /// More than `1 + 3 · 2⁻²⁴`, twice over.
     const GROW: Real = 1.0 + 1e-6;
 
+    fn new(direction: Real) -> Self {
+        let inverse = if direction == 0.0 { 0.0 } else { 1.0 / direction };
+        Self { near: inverse / Self::GROW, far: inverse * Self::GROW }
+    }
+}
+
+impl Slabs {
     /// A point that moves from `origin` along `direction`.
     pub(crate) fn of_point(origin: Vec3, direction: Vec3) -> Self {
-        let inverse = |d: Real| if d == 0.0 { 0.0 } else { 1.0 / d };
-        Self { origin, inverse: direction.to_array().map(inverse), half: Vec3::ZERO }
+        let axes = [Slab::new(direction.x), Slab::new(direction.y), Slab::new(direction.z)];
+        Self { origin, half: Vec3::ZERO, axes, slack: 0.0 }
     }
 
     /// A box with these half extents, for a tree with this box around it.
     pub(crate) fn of_box(origin: Vec3, half: Vec3, direction: Vec3, around: &Aabb) -> Self {
         // Growing a box rounds its corners.
-        let slack = 1e-6 * (around.farthest_from(Vec3::ZERO) + half);
-        Self { half: half + slack, ..Self::of_point(origin, direction) }
+        let slack = 1e-6 * (around.farthest_from(Vec3::ZERO) + abs3(origin) + half);
+        Self { half: half + slack, slack: slack.max_element(), ..Self::of_point(origin, direction) }
     }
 
     /// Fraction at which the line enters each box by `limit`; [`Real::MAX`] for those that it misses.
     #[inline(always)]
     pub(crate) fn enter<W: Lanes<WIDTH>>(&self, low: &LaneVec3<W>, high: &LaneVec3<W>, limit: Real) -> W {
+        let (enter, leave) = self.pass(low, high, limit);
+        leave.if_at_least(enter, enter, W::splat(Real::MAX))
+    }
+
+    /// Fractions at which the line enters each box and leaves it again or reaches the limit; in reverse order for those that it
+    /// misses.
+    #[inline(always)]
+    pub(crate) fn pass<W: Lanes<WIDTH>>(&self, low: &LaneVec3<W>, high: &LaneVec3<W>, limit: Real) -> (W, W) {
         let (low, high) = (low.columns(), high.columns());
         let none = W::splat(Real::MAX);
         let (mut enter, mut leave) = (W::ZERO, W::splat(limit));
@@ -284,17 +307,22 @@ impl Slabs {
             } else {
                 (low[axis] - W::splat(half) - W::splat(origin), high[axis] + W::splat(half) - W::splat(origin))
             };
-            let inverse = self.inverse[axis];
-            if inverse == 0.0 {
-                enter = a.if_positive(none, enter);
-                enter = b.if_at_least(W::ZERO, enter, none);
+            let inverse = self.axes[axis];
+            if inverse.far == 0.0 {
+                leave = a.if_positive(-none, leave);
+                leave = b.if_at_least(W::ZERO, leave, -none);
                 continue;
             }
-            let (near, far) = if inverse > 0.0 { (a, b) } else { (b, a) };
-            enter = (near * W::splat(inverse / Self::GROW)).max(enter);
-            leave = (far * W::splat(inverse * Self::GROW)).min(leave);
+            let (near, far) = if inverse.far > 0.0 { (a, b) } else { (b, a) };
+            enter = (near * W::splat(inverse.near)).max(enter);
+            leave = (far * W::splat(inverse.far)).min(leave);
         }
-        leave.if_at_least(enter, enter, none)
+        (enter, leave)
+    }
+
+    /// How much the box was grown against rounding, at most.
+    pub(crate) fn slack(&self) -> Real {
+        self.slack
     }
 }
 

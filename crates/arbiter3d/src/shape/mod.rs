@@ -190,7 +190,9 @@ pub enum ShapeError {
         advice: &'static str,
     },
     /// A mesh with holes has no inside, so no mass.
-    #[error("{edges} edges of the mesh have no matching neighbour: close it, give the shape density 0, or use a static body")]
+    #[error(
+        "{edges} edges of the mesh have no matching neighbour: close it, give the shape density 0, or use a static body"
+    )]
     OpenMesh {
         /// How many edges are open, or run the same way in two triangles.
         edges: usize,

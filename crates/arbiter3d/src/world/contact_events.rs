@@ -188,6 +188,7 @@ impl World {
             self.flush_events();
         }
         self.events.watched.sort_unstable_by_key(|watched| (watched.key, watched.id));
+        self.events.watched.dedup_by_key(|watched| watched.id);
         if !self.events.unbegun.is_empty() {
             self.raise_begin();
         }

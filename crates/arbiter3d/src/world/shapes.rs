@@ -310,7 +310,8 @@ impl World {
             geometry: definition.shape.clone(),
             density: definition.density,
             material: definition.material.normalized(),
-            palette: (!definition.palette.is_empty()).then(|| definition.palette.iter().map(|m| m.normalized()).collect()),
+            palette: (!definition.palette.is_empty())
+                .then(|| definition.palette.iter().map(|m| m.normalized()).collect()),
             filter: definition.filter,
             sensor: definition.sensor,
             events: definition.events,
