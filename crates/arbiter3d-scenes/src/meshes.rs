@@ -113,7 +113,7 @@ fn gear_profile(teeth: usize, module: f64) -> Vec<[Real; 2]> {
     let step = std::f64::consts::TAU / teeth as f64;
     let half_angle = |radius: f64| 0.2463 * step + unwound(pitch) - unwound(radius);
     let lowest = if base > root { base } else { root };
-    let mut flank: Vec<[f64; 2]> = if base > root { vec![[root, half_angle(base)]] } else { Vec::new() };
+    let mut flank: Vec<[f64; 2]> = if base > root { vec![[root, half_angle(base) + 0.03 * step]] } else { Vec::new() };
     for k in 0..FLANK_POINTS {
         let radius = lowest + (tip - lowest) * k as f64 / (FLANK_POINTS - 1) as f64;
         flank.push([radius, half_angle(radius)]);

@@ -212,7 +212,7 @@ fn a_torus_hangs_on_a_rod() {
     let (corners, triangles) = Shape::hull(&rod).unwrap().triangulate(1);
     world.add_shape(BodyId::WORLD, &ShapeDefinition::new(Shape::mesh(corners, triangles).unwrap())).unwrap();
     let ring = ShapeDefinition::new(torus(24, 12, 0.5, 0.1));
-    let start = BodyDefinition { angular_damping: 0.5, ..BodyDefinition::dynamic().at(Vec3::new(0.05, -0.2, 0.0)) };
+    let start = BodyDefinition { angular_damping: 2.0, ..BodyDefinition::dynamic().at(Vec3::new(0.05, -0.2, 0.0)) };
     let body = add(&mut world, &start, &ring);
     let mut deepest: f32 = 0.0;
     for _ in 0..600 {

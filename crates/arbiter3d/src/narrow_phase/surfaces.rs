@@ -10,9 +10,9 @@
 //! That covers faces that lie on each other as well: the corners of where they overlap are corners of one over the other
 //! and crossings of their borders. Seams inside a flat or hollow surface stick out nowhere and are never felt.
 //!
-//! How deep is deep: a corner that is inside the other surface is pushed out by its nearest face. Where two edges cross deep
-//! inside each other although a face is near (the upright edge of a box and the lower edge of one that stands on it with an
-//! overhang), the crossing says nothing, and is left out. First all is looked for within a short way; only if nothing touches
+//! How deep is deep: a corner that is inside the other surface is pushed out by the nearest face that it can be pushed out by.
+//! Where two edges cross deep inside each other although such a face is near (the upright edge of a box and the lower edge
+//! of one that stands on it with an overhang), the crossing says nothing, and is left out. First all is looked for within a short way; only if nothing touches
 //! so, the surfaces may have run into each other, and everything up to the size of the smaller one is looked at.
 //!
 //! Triangles of two-sided meshes push to their front here. The points go through the same choice as those of a mesh with a
@@ -131,6 +131,12 @@ impl Piece {
                 || (start.x, start.y, start.z).partial_cmp(&(end.x, end.y, end.z)) == Some(std::cmp::Ordering::Less))
     }
 
+    /// Whether edge `i` is square to a normal, as far as an edge that lies on a face is.
+    fn lies_across(&self, i: usize, normal: Vec3) -> bool {
+        let along = self.corners[(i + 1) % 3] - self.corners[i];
+        along.dot(normal).abs() <= SUMMIT_SINE * along.length()
+    }
+
     /// Whether the surface has a summit along `normal` at edge `i`.
     fn edge_allows(&self, i: usize, normal: Vec3) -> bool {
         self.inward[i].dot(normal) <= SUMMIT_SINE
@@ -172,10 +178,8 @@ impl Search<'_> {
             if !self.common.holds(seen) {
                 return;
             }
-            self.near_faces(self.a, seen, |face| {
-                if !is_summit(self.b, corner, -from_a.rotation.rotate(face.normal)) {
-                    return;
-                }
+            let allows = |normal: Vec3| is_summit(self.b, corner, -from_a.rotation.rotate(normal));
+            self.near_faces(self.a, seen, allows, |face| {
                 out.push(Candidate {
                     position: seen - face.normal * face.height,
                     normal: face.normal,
@@ -191,25 +195,30 @@ impl Search<'_> {
     /// Corners of `a` at faces of `b`.
     fn corners_of_a(&self, out: &mut Candidates) {
         each_sharp_corner(self.a, self.common, |corner| {
-            self.near_faces(self.b, self.inverse.transform_point(corner), |face| {
-                let normal = -self.pose.rotation.rotate(face.normal);
-                if is_summit(self.a, corner, normal) {
-                    out.push(Candidate {
-                        position: corner,
-                        normal,
-                        separation: face.height,
-                        feature: !position_number(corner),
-                        facet: NO_FACET,
-                        triangle: 0,
-                    });
-                }
+            let outwards = |normal: Vec3| -self.pose.rotation.rotate(normal);
+            let allows = |normal: Vec3| is_summit(self.a, corner, outwards(normal));
+            self.near_faces(self.b, self.inverse.transform_point(corner), allows, |face| {
+                out.push(Candidate {
+                    position: corner,
+                    normal: outwards(face.normal),
+                    separation: face.height,
+                    feature: !position_number(corner),
+                    facet: NO_FACET,
+                    triangle: 0,
+                });
             });
         });
     }
 
-    /// Calls `visit` with the faces that a corner (in the frame of the surface) touches: all that it is in front of within the
-    /// margin, and if it is behind, the nearest.
-    fn near_faces(&self, surface: Surface<'_>, corner: Vec3, mut visit: impl FnMut(&NearFace)) {
+    /// Calls `visit` with the faces that a corner (in the frame of the surface) touches, of those along whose normals it can be
+    /// pushed: all that it is in front of within the margin, and if it is behind, the nearest.
+    fn near_faces(
+        &self,
+        surface: Surface<'_>,
+        corner: Vec3,
+        allows: impl Fn(Vec3) -> bool,
+        mut visit: impl FnMut(&NearFace),
+    ) {
         let around = Aabb::from_center(corner, Vec3::splat(max(self.reach, self.margin)));
         let slack = 1e-3 * self.scale;
         let (mut faces, mut count) = ([NearFace::default(); MOST_FACES], 0);
@@ -226,9 +235,9 @@ impl Search<'_> {
                 normal.cross(along).dot(corner - corners[i]) >= -slack * along.length()
             });
             if over {
-                nearest = min(height.abs(), nearest);
                 let known = faces[..count].iter().any(|face| face.normal.dot(normal) > 0.99999);
-                if !known && count < MOST_FACES {
+                if !known && count < MOST_FACES && allows(normal) {
+                    nearest = min(height.abs(), nearest);
                     faces[count] = NearFace { normal, height };
                     count += 1;
                 }
@@ -289,7 +298,7 @@ impl Search<'_> {
                 || separation < -self.reach
                 || !a.edge_allows(i, normal)
                 || !b.edge_allows(k, -normal)
-                || self.is_explained([on_a, on_b], -separation)
+                || self.is_explained((a, i), (b, k), [on_a, on_b], -separation)
             {
                 continue;
             }
@@ -299,13 +308,25 @@ impl Search<'_> {
         }
     }
 
-    /// Whether a face is so near to where two edges cross that it explains the overlap.
-    fn is_explained(&self, [on_a, on_b]: [Vec3; 2], depth: Real) -> bool {
+    /// Whether a face of the one that could push the edge of the other is so near to where the edges cross that it explains
+    /// the overlap.
+    fn is_explained(
+        &self,
+        (a, i): (&Piece, usize),
+        (b, k): (&Piece, usize),
+        [on_a, on_b]: [Vec3; 2],
+        depth: Real,
+    ) -> bool {
         if depth <= 0.02 * self.scale {
             return false;
         }
         let near = EXPLAINED * depth;
-        is_within(self.a, on_b, near) || is_within(self.b, self.inverse.transform_point(on_a), near)
+        let pushes_b = |normal: Vec3| b.lies_across(k, normal) && b.edge_allows(k, -normal);
+        let pushes_a = |normal: Vec3| {
+            let normal = self.pose.rotation.rotate(normal);
+            a.lies_across(i, normal) && a.edge_allows(i, -normal)
+        };
+        is_within(self.a, on_b, near, pushes_b) || is_within(self.b, self.inverse.transform_point(on_a), near, pushes_a)
     }
 }
 
@@ -337,11 +358,12 @@ fn is_summit(surface: Surface<'_>, corner: Vec3, normal: Vec3) -> bool {
     highest
 }
 
-/// Whether some triangle is nearer to a point than `distance`.
-fn is_within(surface: Surface<'_>, point: Vec3, distance: Real) -> bool {
+/// Whether some triangle with a normal that counts is nearer to a point than `distance`.
+fn is_within(surface: Surface<'_>, point: Vec3, distance: Real, counts: impl Fn(Vec3) -> bool) -> bool {
     let mut near = false;
     surface.for_each_facet(&Aabb::from_center(point, Vec3::splat(distance)), |index| {
-        near |= distance_squared(&surface.corners(index), point) < distance * distance;
+        near |= distance_squared(&surface.corners(index), point) < distance * distance
+            && counts(surface.facet(index).normal());
     });
     near
 }
