@@ -309,18 +309,17 @@ impl HeightField {
     /// The triangles of a leaf side by side; lanes past the last hold that one again.
     #[inline(always)]
     pub(crate) fn corners_of_leaf<W: Lanes<LEAF>>(&self, first: usize, count: usize) -> [LaneVec3<W>; 3] {
-        let mut numbers = [[[0.0; LEAF]; 3]; 3];
-        for lane in 0..LEAF {
-            let corners = self.corners(first + lane.min(count - 1));
-            for i in 0..3 {
-                numbers[i][0][lane] = corners[i].x;
-                numbers[i][1][lane] = corners[i].y;
-                numbers[i][2][lane] = corners[i].z;
-            }
+        let mut triangles = [[Vec3::ZERO; 3]; LEAF];
+        for (lane, corners) in triangles.iter_mut().enumerate() {
+            *corners = self.corners(first + lane.min(count - 1));
         }
         let mut lanes = [LaneVec3::ZERO; 3];
-        for (lane, [x, y, z]) in lanes.iter_mut().zip(numbers) {
-            *lane = LaneVec3 { x: W::from_array(x), y: W::from_array(y), z: W::from_array(z) };
+        for (i, corner) in lanes.iter_mut().enumerate() {
+            let [mut x, mut y, mut z] = [[0.0; LEAF]; 3];
+            for (lane, corners) in triangles.iter().enumerate() {
+                (x[lane], y[lane], z[lane]) = (corners[i].x, corners[i].y, corners[i].z);
+            }
+            *corner = LaneVec3 { x: W::from_array(x), y: W::from_array(y), z: W::from_array(z) };
         }
         lanes
     }
