@@ -1,8 +1,8 @@
 //! Rays and shape casts a second: the same questions to every engine, one thread, in worlds of static shapes.
 //!
 //! Every engine is built from the same plain data and asked through its public interface for the closest hit. How many
-//! questions hit and the sum of the fractions are reported beside each time: engines that did the same work agree on both. Runs
-//! alternate between engines; the fastest of the repetitions counts.
+//! questions hit and the sum of the fractions are reported beside each time: engines that did the same work agree on
+//! both. Runs alternate between engines; the fastest of the repetitions counts.
 
 use crate::args::Wrong;
 use crate::engine::{Ask, Kind, ask};

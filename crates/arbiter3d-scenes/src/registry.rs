@@ -240,6 +240,24 @@ pub static SCENES: &[Scene] = &[
         build: scenes::trees::trees25,
     },
     Scene {
+        name: "high_speed_room",
+        description: "5,000 bodies at 250 m/s in a closed room with elastic walls (Jolt)",
+        size: Size::new("bodies", 5000, 100_000),
+        build: scenes::fast::high_speed_room,
+    },
+    Scene {
+        name: "high_speed_bullets",
+        description: "the same with bullets, which hit each other too and lose no time",
+        size: Size::new("bodies", 5000, 100_000),
+        build: scenes::fast::high_speed_bullets,
+    },
+    Scene {
+        name: "spinning_rods",
+        description: "400 thin rods spin at 100 rad/s in a closed room with walls of 1 cm",
+        size: Size::new("rods", 400, 100_000),
+        build: scenes::fast::spinning_rods,
+    },
+    Scene {
         name: "ramps",
         description: "boxes with friction 0, 0.1, … 1 on a slope of 30°: those above 0.577 stick",
         size: Size::FIXED,

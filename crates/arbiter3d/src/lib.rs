@@ -52,7 +52,7 @@ pub use simd::{SimdLevel, UnknownSimdLevel};
 pub use world::{
     Anisotropy, BeginEvent, BeginListener, BodyDefinition, BodyId, BodyKind, BodyKinds, BodyMut, BodyRef, CastHit,
     CombineRule, ContactEvents, ContactFilter, ContactProvider, EndEvent, EndListener, Error, Filter, HitEvent,
-    HitListener, LockedAxes, Material, PairFilter, PersistEvent, Phase, PointHit, PreSolveListener, QueryFilter,
-    RayHit, SensorEvent, ShapeContacts, ShapeDefinition, ShapeId, ShapeMut, ShapePair, ShapePredicate, ShapeRef,
-    StepContext, StepReport, Timings, UNIT_TOLERANCE, World, WorldSettings,
+    HitListener, Impact, LockedAxes, Material, PairFilter, PersistEvent, Phase, PointHit, PreSolveListener,
+    QueryFilter, RayHit, SensorEvent, ShapeContacts, ShapeDefinition, ShapeId, ShapeMut, ShapePair, ShapePredicate,
+    ShapeRef, StepContext, StepReport, Timings, UNIT_TOLERANCE, World, WorldSettings,
 };

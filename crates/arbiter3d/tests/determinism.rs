@@ -1,4 +1,4 @@
-//! The same bits for any number of threads and any SIMD level: seven scenes against checked-in hashes.
+//! The same bits for any number of threads and any SIMD level: eight scenes against checked-in hashes.
 //!
 //! The state hash is taken after each tenth step and folded into one number a scene. After a change that is meant to alter
 //! results, print the new table with
@@ -19,14 +19,15 @@ use arbiter3d::{
 use common::*;
 
 /// The hashes of the scenes, in their order.
-const GOLDEN: [(&str, u64); 7] = [
+const GOLDEN: [(&str, u64); 8] = [
     ("pile", 0xaac7_fc32_c6dd_5cd4),
     ("hulls", 0x7d4f_1a72_0999_6ad2),
-    ("mesh rain", 0xbbc5_9568_a34d_b749),
-    ("bullets", 0x2095_d005_d124_c013),
+    ("mesh rain", 0x5dbb_e991_fd15_42a9),
+    ("bullets", 0x75d1_ec1d_6776_8a2b),
     ("custom contacts", 0xf4d2_df3a_d912_e6b7),
-    ("coming and going", 0x8fe6_cf19_2475_ff5b),
+    ("coming and going", 0x61e5_ab28_4389_24db),
     ("surfaces", 0x75da_f17e_e1a8_66ff),
+    ("rods and bullets", 0x945b_21b6_158d_4406),
 ];
 
 /// A scene: how it begins, and what is done before each step.
@@ -37,7 +38,7 @@ struct Scene {
     before_step: fn(&mut World, usize),
 }
 
-const SCENES: [Scene; 7] = [
+const SCENES: [Scene; 8] = [
     Scene { name: "pile", steps: 180, build: pile, before_step: |_, _| {} },
     Scene { name: "hulls", steps: 150, build: hulls, before_step: |_, _| {} },
     Scene { name: "mesh rain", steps: 180, build: mesh_rain, before_step: |_, _| {} },
@@ -45,6 +46,7 @@ const SCENES: [Scene; 7] = [
     Scene { name: "custom contacts", steps: 180, build: custom_contacts, before_step: |_, _| {} },
     Scene { name: "coming and going", steps: 300, build: coming_and_going, before_step: come_and_go },
     Scene { name: "surfaces", steps: 180, build: surfaces, before_step: ask_for_surfaces },
+    Scene { name: "rods and bullets", steps: 120, build: rods_and_bullets, before_step: |_, _| {} },
 ];
 
 /// Bodies of all shapes on a lattice over the origin, each turned and moving at random.
@@ -188,6 +190,34 @@ fn come_and_go(world: &mut World, step: usize) {
         ..body
     };
     add(world, &body, &ShapeDefinition::new(random.shape()));
+}
+
+/// Spinning rods, bullets of all shapes, resting crates and a door that swings, in a room with thin elastic walls.
+fn rods_and_bullets(world: &mut World) {
+    for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
+        for side in [-1.0, 1.0] {
+            let wall = Shape::cuboid(Vec3::splat(6.0) - axis * 5.99).unwrap();
+            let wall = ShapeDefinition::new(wall).at(axis * side * 6.0 + Vec3::Y * 6.0);
+            world.add_shape(BodyId::WORLD, &wall.restitution(0.9)).unwrap();
+        }
+    }
+    let door = BodyDefinition::kinematic().at(Vec3::Y * 3.0).moving(Vec3::ZERO, Vec3::Y * 4.0);
+    add(world, &door, &ShapeDefinition::new(cuboid(2.0, 2.0, 0.02)));
+    let mut random = Random(47);
+    let rods = [capsule(0.6, 0.01), cuboid(0.01, 0.6, 0.01), Shape::hull(&bar(0.6)).unwrap()];
+    for at in 0..60 {
+        let body = BodyDefinition::dynamic().at(Vec3::Y * 6.0 + random.vector(4.5)).rotated(random.rotation());
+        let (speed, spin) = [(10.0, 60.0), (150.0, 20.0), (0.0, 0.0)][at % 3];
+        let body = BodyDefinition { bullet: at % 3 == 1, ..body.moving(random.vector(speed), random.vector(spin)) };
+        let shape = if at % 3 == 0 { rods[at / 3 % 3].clone() } else { random.shape() };
+        add(world, &body, &ShapeDefinition::new(shape).restitution(0.5));
+    }
+}
+
+/// Corners of a bar along y.
+fn bar(half: f32) -> Vec<Vec3> {
+    let side = |i: u32, bit: u32, half: f32| if i >> bit & 1 == 1 { half } else { -half };
+    (0..8).map(|i| Vec3::new(side(i, 0, 0.01), side(i, 1, half), side(i, 2, 0.01))).collect()
 }
 
 /// Bodies of all shapes, some with easy friction one way, are thrown up through one-way platforms, of which one moves,
@@ -334,10 +364,16 @@ fn golden_surfaces() {
     check(6);
 }
 
+/// Rods that spin, bullets and a door.
+#[test]
+fn golden_rods_and_bullets() {
+    check(7);
+}
+
 /// The scenes do what they are for: they have contacts, sleepers and motion.
 #[test]
 fn the_scenes_are_worth_hashing() {
-    for (scene, contacts) in SCENES.iter().zip([500, 300, 400, 50, 150, 100, 150]) {
+    for (scene, contacts) in SCENES.iter().zip([500, 300, 400, 50, 150, 100, 150, 5]) {
         let mut world = World::new(settings(1, SimdLevel::best())).unwrap();
         let hashes = play(&mut world, scene);
         let found = world.contact_count();

@@ -8,6 +8,8 @@ mod batch;
 mod casts;
 #[path = "queries/nearest.rs"]
 mod nearest;
+#[path = "queries/watertight.rs"]
+mod watertight;
 
 use arbiter3d::math::{Aabb, Vec3};
 use arbiter3d::{
@@ -19,17 +21,17 @@ use std::sync::Arc;
 
 /// 300 bodies of all shapes strewn about, some static, and a piece of mesh.
 fn strewn(random: &mut Random) -> World {
-    strewn_with(random, MeshSides::One)
+    strewn_with(random, MeshSides::One, 300)
 }
 
 /// The same with a mesh that is solid on both sides.
 fn strewn_two_sided(random: &mut Random) -> World {
-    strewn_with(random, MeshSides::Two)
+    strewn_with(random, MeshSides::Two, 300)
 }
 
-fn strewn_with(random: &mut Random, sides: MeshSides) -> World {
+fn strewn_with(random: &mut Random, sides: MeshSides, count: usize) -> World {
     let mut world = weightless();
-    for at in 0..300 {
+    for at in 0..count {
         let place = Vec3::new(random.range(-10.0, 10.0), random.range(-10.0, 10.0), random.range(-10.0, 10.0));
         let body = if at % 3 == 0 { BodyDefinition::fixed() } else { BodyDefinition::dynamic() };
         let shape =

@@ -3,6 +3,7 @@
 pub(crate) mod behaviour;
 pub(crate) mod colosseum;
 pub(crate) mod drums;
+pub(crate) mod fast;
 pub(crate) mod fields;
 pub(crate) mod gears_and_tiles;
 pub(crate) mod piles;

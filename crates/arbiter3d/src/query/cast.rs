@@ -1,10 +1,12 @@
 //! Shapes that move past others: from one pose to another, until they touch.
 //!
-//! A shape that only moves along a line is cast by GJK on the moving difference (`narrow_phase::linear_cast`), one that turns
-//! as well by conservative advancement (`narrow_phase::time_of_impact`). Composites, on either side, are taken part by part.
+//! A shape that only moves along a line is cast by GJK on the moving difference (`narrow_phase::linear_cast`), one that
+//! turns as well by conservative advancement (`narrow_phase::time_of_impact`). Composites, on either side, are taken
+//! part by part.
 //!
-//! A shape that overlaps at the start hits at fraction 0; how deep and along which normal is what the narrow phase says of the
-//! two shapes as wholes. A one-sided triangle stops only shapes whose middle is in front of it when they touch, as in contacts.
+//! A shape that overlaps at the start hits at fraction 0; how deep and along which normal is what the narrow phase says
+//! of the two shapes as wholes. A one-sided triangle stops only shapes whose middle is in front of it when they touch,
+//! as in contacts.
 
 use super::pair::deepest_contact;
 use super::parts::{Part, Path, Region, Solid, visit_parts};
@@ -14,6 +16,8 @@ use crate::shape::Shape;
 
 /// How far apart turning shapes count as touching, as a share of their reach.
 const CONTACT: Real = 1e-5;
+/// A shape that still spins close to a surface after so many rounds is stopped there, early.
+const MAX_ROUNDS: usize = 256;
 /// How far behind a one-sided triangle the middle of a shape may be that it stops, as a share of the shape's size.
 const BEHIND: Real = 1e-3;
 
@@ -273,7 +277,8 @@ fn turning_cast(still: &Support, support: &Support, sweep: &Sweep, limit: Real) 
     }
     let target = CONTACT * support.reach(sweep.pivot);
     let stop = time_of_impact(still, &Sweep::still(Pose::IDENTITY), support, sweep, target);
-    let Some(fraction) = stop.filter(|&fraction| fraction <= limit) else { return Cast::Miss };
+    let fraction = stop.and_then(|stop| approach((still, support), sweep, stop, target));
+    let Some(fraction) = fraction.filter(|&fraction| fraction <= limit) else { return Cast::Miss };
     // Where rounding has the cores overlap there is no normal: a moment earlier there is.
     let mut back = 0.0;
     loop {
@@ -284,6 +289,34 @@ fn turning_cast(still: &Support, support: &Support, sweep: &Sweep, limit: Real) 
         }
         back = crate::math::max(2.0 * back, 1e-6);
     }
+}
+
+/// Goes on from a time that may be early, for a shape that spins close to a surface, until the gap is the target's;
+/// `None` if it never is. By the same bound of the speed as in `time_of_impact`.
+fn approach((still, support): (&Support, &Support), sweep: &Sweep, from: Real, target: Real) -> Option<Real> {
+    let (p, q) = (sweep.start.rotation, sweep.end.rotation);
+    let sign = if p.dot(q) < 0.0 { -1.0 } else { 1.0 };
+    let spin = q.mul(p.conjugate()).vector() * (sign * 4.0 / (1.0 + p.dot(q).abs()));
+    let displacement = sweep.end.transform_point(sweep.pivot) - sweep.start.transform_point(sweep.pivot);
+    let reach = support.reach(sweep.pivot);
+    let mut time = from;
+    for _ in 0..MAX_ROUNDS {
+        let Some(found) = closest(still, support, &swept(sweep, time)) else { return Some(time) };
+        let gap = found.gap(still, support);
+        if gap <= 2.0 * target {
+            return Some(time);
+        }
+        let speed = reach * spin.cross(found.normal).length() - displacement.dot(found.normal);
+        let next = time + (gap - target) / speed;
+        if speed <= 0.0 || next > 1.0 {
+            return None;
+        }
+        if next <= time {
+            return Some(time);
+        }
+        time = next;
+    }
+    Some(time)
 }
 
 /// Where a sweep is at a time: its pivot moves straight, not the origin of its frame.

@@ -1,7 +1,7 @@
 //! Questions about shapes that do not change them: rays, casts of shapes, overlaps, distances.
 //!
-//! What a shape is made of is known in one place ([`parts`]); rays have kernels of their own ([`ray`]) for the kinds that
-//! allow it. The world (`world::queries`) finds the shapes that may matter and asks here about each.
+//! What a shape is made of is known in one place ([`parts`]); rays have kernels of their own ([`ray`]) for the kinds
+//! that allow it. The world (`world::queries`) finds the shapes that may matter and asks here about each.
 
 pub(crate) mod cast;
 mod convex_ray;

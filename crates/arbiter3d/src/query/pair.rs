@@ -1,7 +1,7 @@
 //! Two placed shapes: whether they overlap, how far apart they are, where they touch.
 //!
-//! Distances are those of the closest parts, found by GJK. Where parts overlap, GJK has no distance; the narrow phase then says
-//! how deep, as far as it knows: it gives the depth along the normal by which it would push the shapes apart.
+//! Distances are those of the closest parts, found by GJK. Where parts overlap, GJK has no distance; the narrow phase
+//! then says how deep, as far as it knows: it gives the depth along the normal by which it would push the shapes apart.
 
 use super::parts::{Part, Region, visit_parts};
 use crate::math::{Aabb, Pose, Real, Vec3, normalize_or};
@@ -30,8 +30,8 @@ pub struct ShapeDistance {
     pub normal: Vec3,
 }
 
-/// Distance and closest points of two shapes placed in the world; `None` where they are farther apart than `max_distance`
-/// (metres, may be infinite).
+/// Distance and closest points of two shapes placed in the world; `None` where they are farther apart than
+/// `max_distance` (metres, may be infinite).
 ///
 /// Meshes count as surfaces, seen from both sides. Method: Gilbert, Johnson and Keerthi, 1988, on the nearest parts.
 ///
@@ -169,8 +169,8 @@ pub(crate) fn deepest_contact(shape1: &Shape, shape2: &Shape, pose: &Pose) -> Op
     deepest
 }
 
-/// How deep two shapes overlap. Where the narrow phase has nothing to say (two surfaces that cross, or a body behind a one-sided
-/// mesh) that is zero, along the line between their middles.
+/// How deep two shapes overlap. Where the narrow phase has nothing to say (two surfaces that cross, or a body behind a
+/// one-sided mesh) that is zero, along the line between their middles.
 fn depth(shape1: &Shape, shape2: &Shape, pose: &Pose) -> ShapeDistance {
     if let Some(contact) = deepest_contact(shape1, shape2, pose) {
         let distance = crate::math::min(contact.separation, 0.0);
@@ -181,8 +181,8 @@ fn depth(shape1: &Shape, shape2: &Shape, pose: &Pose) -> ShapeDistance {
     ShapeDistance { distance: 0.0, point1: middle2, point2: middle2, normal }
 }
 
-/// The point of a shape that is closest to a point of its frame, no farther than `max_distance`. The point itself where it is
-/// inside, with a zero normal.
+/// The point of a shape that is closest to a point of its frame, no farther than `max_distance`. The point itself where
+/// it is inside, with a zero normal.
 pub(crate) fn closest_point(shape: &Shape, point: Vec3, max_distance: Real) -> Option<Separation> {
     let probe = Support::Triangle([Vec3::ZERO; 3]);
     let placed = Pose::from_position(point);

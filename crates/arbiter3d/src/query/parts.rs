@@ -1,9 +1,9 @@
 //! The convex parts of any shape: the one place that knows what a shape is made of.
 //!
-//! Every query but the ray asks for the parts of a shape in some region ([`Region`]) and does the same with each of them: a
-//! convex shape has one part, a mesh one for each triangle. A new kind of convex shape needs nothing here once it has a
-//! [`Support`]. A new kind of composite needs one arm in [`visit_parts`], which hands over every part whose box the region
-//! meets: nearest first if it has a tree of its own, else in any order.
+//! Every query but the ray asks for the parts of a shape in some region ([`Region`]) and does the same with each of
+//! them: a convex shape has one part, a mesh one for each triangle. A new kind of convex shape needs nothing here once
+//! it has a [`Support`]. A new kind of composite needs one arm in [`visit_parts`], which hands over every part whose
+//! box the region meets: nearest first if it has a tree of its own, else in any order.
 
 use crate::math::{Aabb, Pose, Real, Vec3, abs3, max, max3, min};
 use crate::narrow_phase::Support;
@@ -49,8 +49,8 @@ impl<'a> Part<'a> {
         self.pose.map_or(vector, |own| own.rotation.inverse_rotate(vector))
     }
 
-    /// Whether a shape whose middle is here (in the frame of the part) is pushed by the part: not from behind one that is
-    /// solid in front only. `slack` is how far behind still counts, metres.
+    /// Whether a shape whose middle is here (in the frame of the part) is pushed by the part: not from behind one that
+    /// is solid in front only. `slack` is how far behind still counts, metres.
     pub(crate) fn faces(&self, middle: Vec3, slack: Real) -> bool {
         match &self.support {
             Support::Triangle([a, b, c]) if self.one_sided => {
@@ -82,7 +82,8 @@ pub(crate) struct Solid {
     /// Half of its edges.
     pub edges: [Vec3; 3],
     pub radius: Real,
-    /// Whether what moves keeps its middle there: then a one-sided triangle behind which it starts and stays is no part.
+    /// Whether what moves keeps its middle there: then a one-sided triangle behind which it starts and stays is no
+    /// part.
     pub is_rigid: bool,
 }
 
@@ -97,7 +98,8 @@ impl Solid {
     }
 }
 
-/// Where parts are looked for, in the frame of the shape. Each visit returns a new limit; a negative one ends the search.
+/// Where parts are looked for, in the frame of the shape. Each visit returns a new limit; a negative one ends the
+/// search.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Region {
     /// What overlaps a box. The limit means nothing but its sign.
@@ -167,7 +169,8 @@ impl Path {
     }
 }
 
-/// Calls `visit` with each convex part of a shape whose box meets the region, and the present limit; it returns a new one.
+/// Calls `visit` with each convex part of a shape whose box meets the region, and the present limit; it returns a new
+/// one.
 pub(crate) fn visit_parts<'a>(shape: &'a Shape, region: &Region, mut visit: impl FnMut(&Part<'a>, Real) -> Real) {
     match shape {
         Shape::Mesh(mesh) => visit_triangles(mesh, region, &mut visit),
@@ -282,8 +285,8 @@ impl<'a, F: FnMut(&Part<'a>, Real) -> Real> Descent for Along<'a, '_, F> {
 }
 
 impl Solid {
-    /// When the solid is in the box of each triangle and in its plane, given the times at which it enters the box and leaves
-    /// it; [`Real::MAX`] where it never is in both at once, or stays behind a one-sided triangle.
+    /// When the solid is in the box of each triangle and in its plane, given the times at which it enters the box and
+    /// leaves it; [`Real::MAX`] where it never is in both at once, or stays behind a one-sided triangle.
     #[inline(always)]
     fn through_planes<W: Lanes<LEAF>>(
         &self,

@@ -1,9 +1,9 @@
 //! Rays against single shapes, in the shape's own frame.
 //!
-//! A ray is `origin + t · direction` for `0 ≤ t ≤ max_fraction`; the direction need not be a unit vector, and `t` scales
-//! with its inverse. A ray that starts inside a shape (or on its surface, unless it enters there) hits at fraction 0 with a
-//! zero normal, for there is no surface to speak of. Otherwise the normal is the unit normal of the surface, pointing out.
-//! A hit exactly at `max_fraction` counts. Numbers that are not finite miss.
+//! A ray is `origin + t · direction` for `0 ≤ t ≤ max_fraction`; the direction need not be a unit vector, and `t`
+//! scales with its inverse. A ray that starts inside a shape (or on its surface, unless it enters there) hits at
+//! fraction 0 with a zero normal, for there is no surface to speak of. Otherwise the normal is the unit normal of the
+//! surface, pointing out. A hit exactly at `max_fraction` counts. Numbers that are not finite miss.
 //!
 //! - *Sphere, capsule:* the quadratic is solved about the point of the line that is closest to the centre, not about the
 //!   origin: with `p` that point, `t = t_p − sqrt(r² − |p|²) / |d|`, which keeps its digits when the origin is far away.
@@ -175,8 +175,8 @@ pub(crate) fn cast_sphere(radius: Real, ray: &Ray) -> Option<ShapeHit> {
     hit_at(fraction, point / point.length(), ray)
 }
 
-/// The line first enters the infinite cylinder about y. Within the segment that is the hit. Past an end, everything that
-/// follows inside the cylinder reaches the capsule through the ball at that end, so the ball decides.
+/// The line first enters the infinite cylinder about y. Within the segment that is the hit. Past an end, everything
+/// that follows inside the cylinder reaches the capsule through the ball at that end, so the ball decides.
 pub(crate) fn cast_capsule(capsule: &Capsule, ray: &Ray) -> Option<ShapeHit> {
     let (radius, half_length) = (capsule.radius(), capsule.half_length());
     let (origin, direction) = (ray.origin, ray.direction);
@@ -212,7 +212,8 @@ impl Clip {
         Self { enter: 0.0, leave: ray.max_fraction, normal: Vec3::ZERO }
     }
 
-    /// Cuts off what lies in front of a plane, given the height of the origin over it and the rate at which the ray rises.
+    /// Cuts off what lies in front of a plane, given the height of the origin over it and the rate at which the ray
+    /// rises.
     #[inline(always)]
     fn cut(&mut self, normal: Vec3, height: Real, rate: Real) -> bool {
         if height.is_nan() || rate.is_nan() {

@@ -20,6 +20,7 @@ mod half_space;
 mod height_field;
 mod hull;
 mod hull_builder;
+mod hull_core;
 mod hull_features;
 mod hull_merge;
 mod mass;
@@ -552,6 +553,15 @@ impl Shape {
             }
             other => Support::new(other)
                 .map_or_else(Default::default, |support| convex::surface_of_support(&support, steps.clamp(1, 64))),
+        }
+    }
+
+    /// Which material of the palette a triangle of a mesh or a height field has, by the number that the user knows it by.
+    pub(crate) fn triangle_material(&self, triangle: u32) -> u8 {
+        match self {
+            Self::Mesh(mesh) => mesh.materials().get(triangle as usize).copied().unwrap_or(0),
+            Self::HeightField(field) => field.material(triangle as usize),
+            _ => 0,
         }
     }
 

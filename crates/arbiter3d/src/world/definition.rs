@@ -110,8 +110,12 @@ pub struct BodyDefinition {
     pub awake: bool,
     /// Whether the body takes part at all. Default true.
     pub enabled: bool,
-    /// Whether continuous collision stops the body at static shapes when it is fast. Default true.
+    /// Whether continuous collision stops the body at static and kinematic shapes when it is fast. Default true.
     pub continuous: bool,
+    /// Whether the body is a bullet: when it is fast, it meets dynamic bodies too, other bullets included, and bounces off
+    /// within the step, losing no time. Counts while `continuous` is true. A kinematic bullet hits what it sweeps over.
+    /// Default false.
+    pub bullet: bool,
     /// Yours to use. Default 0.
     pub user_data: u128,
 }
@@ -133,6 +137,7 @@ impl Default for BodyDefinition {
             awake: true,
             enabled: true,
             continuous: true,
+            bullet: false,
             user_data: 0,
         }
     }

@@ -24,6 +24,7 @@ pub use crate::error::{Error, UNIT_TOLERANCE};
 pub use crate::id::{BodyId, ShapeId};
 pub use bodies::{BodyMut, BodyRef};
 pub use contact_events::{HitEvent, HitListener, PersistEvent, PreSolveListener};
+pub use continuous::Impact;
 pub use definition::{
     Anisotropy, BodyDefinition, BodyKind, CombineRule, ContactEvents, Filter, LockedAxes, Material, ShapeDefinition,
 };
@@ -121,6 +122,13 @@ pub struct World {
     index_scratch: Vec<u32>,
     /// Where fast bodies stop.
     stops: Vec<Option<Pose>>,
+    /// Kinematic bodies, sorted; and their shapes on their ways, while fast bodies are looked at.
+    kinematic: Vec<u32>,
+    /// Bullets, sorted; and what their flight needs.
+    bullets: Vec<u32>,
+    flight: continuous::FlightScratch,
+    impacts: Vec<Impact>,
+    kinematic_shapes: Vec<continuous::KinematicShape>,
     member_scratch: Vec<(u32, u32)>,
     /// Bodies of new pairs, and whether one is awake.
     tie_scratch: Vec<([u32; 2], bool)>,
@@ -198,6 +206,11 @@ impl World {
             wake_scratch: Vec::new(),
             index_scratch: Vec::new(),
             stops: Vec::new(),
+            kinematic: Vec::new(),
+            bullets: Vec::new(),
+            flight: continuous::FlightScratch::default(),
+            impacts: Vec::new(),
+            kinematic_shapes: Vec::new(),
             member_scratch: Vec::new(),
             tie_scratch: Vec::new(),
         };
@@ -312,6 +325,7 @@ impl World {
         body.can_sleep = definition.can_sleep;
         body.enabled = definition.enabled;
         body.continuous = definition.continuous;
+        body.bullet = definition.bullet;
         body.user_data = definition.user_data;
         let (linear, angular) = definition.locked_axes.free();
         let state = &mut self.solver_bodies.states[index as usize];
@@ -320,6 +334,7 @@ impl World {
         let motion = &mut self.solver_bodies.motions[index as usize];
         (motion.linear_damping, motion.angular_damping) = (definition.linear_damping, definition.angular_damping);
         self.update_mass(index);
+        self.note_kind(index);
         if definition.awake {
             self.wake(index);
         } else if definition.kind == BodyKind::Dynamic && definition.enabled && definition.can_sleep {
@@ -345,6 +360,7 @@ impl World {
         }
         self.leave_sleep(index);
         self.bodies[index as usize].alive = false;
+        self.note_kind(index);
         self.solver_bodies.reset(index as usize);
         self.flush_events();
         self.listeners.forget_body(index);
@@ -425,6 +441,20 @@ impl World {
         }
     }
 
+    /// Keeps the lists of kinematic bodies and of bullets.
+    fn note_kind(&mut self, index: u32) {
+        let body = &self.bodies[index as usize];
+        let kinematic = body.alive && body.kind == BodyKind::Kinematic;
+        let bullet = body.alive && body.bullet;
+        for (list, listed) in [(&mut self.kinematic, kinematic), (&mut self.bullets, bullet)] {
+            match list.binary_search(&index) {
+                Ok(at) if !listed => drop(list.remove(at)),
+                Err(at) if listed => list.insert(at, index),
+                _ => {}
+            }
+        }
+    }
+
     fn change_kind(&mut self, index: u32, kind: BodyKind) {
         self.wake_neighbours(index);
         self.end_arbiters_of(index, EndReason::KindChanged);
@@ -434,6 +464,7 @@ impl World {
         }
         self.leave_sleep(index);
         self.bodies[index as usize].kind = kind;
+        self.note_kind(index);
         self.refresh_solver_body(index);
         if self.bodies[index as usize].enabled {
             for &slot in &slots {

@@ -2,7 +2,7 @@
 
 use crate::common::*;
 use crate::{strewn, strewn_two_sided};
-use arbiter3d::math::{Pose, Vec3};
+use arbiter3d::math::{Pose, Rotation, Vec3};
 use arbiter3d::{
     BodyDefinition, BodyId, BodyKinds, QueryFilter, Ray, Shape, ShapeCast, ShapeDefinition, ShapeRef, World,
     WorldSettings,
@@ -121,4 +121,50 @@ fn queries_work_inside_listeners() {
     }));
     run(&mut world, 1.0);
     assert!(asked.load(Ordering::Relaxed) > 0);
+}
+
+/// Numbers that make no sense are errors, and lengths of zero and infinity are none.
+#[test]
+fn bad_numbers_are_errors_and_extreme_ones_are_answered() {
+    let mut random = Random(63);
+    let world = strewn(&mut random);
+    let filter = QueryFilter::default();
+    let ball = sphere(0.5);
+    let good = Pose::IDENTITY;
+    let bad = [
+        Pose::from_position(Vec3::new(0.0, f32::NAN, 0.0)),
+        Pose::from_position(Vec3::splat(f32::INFINITY)),
+        Pose::new(Vec3::ZERO, Rotation::from_xyzw(0.0, 0.0, 0.0, 2.0)),
+        Pose::new(Vec3::ZERO, Rotation::from_xyzw(f32::NAN, 0.0, 0.0, 1.0)),
+    ];
+    for pose in &bad {
+        for (start, end) in [(*pose, good), (good, *pose)] {
+            let cast = ShapeCast::between(&ball, start, end);
+            assert!(world.cast_shape(&cast, &filter).is_err() && world.cast_shapes(&[cast], &filter).is_err());
+            assert!(world.cast_shape_all(&cast, &filter).is_err() && world.cast_shape_any(&cast, &filter).is_err());
+        }
+        assert!(world.overlap_shape(&ball, pose, &filter).is_err());
+        assert!(world.closest_shape(&ball, pose, 1.0, &filter).is_err());
+        assert!(world.collide_shape(&ball, pose, 0.0, &filter).is_err());
+    }
+    assert!(world.collide_shape(&ball, &good, -1.0, &filter).is_err());
+    assert!(world.nearest_shapes(Vec3::ZERO, 3, f32::NAN, &filter).is_err());
+    assert!(world.overlap_point(Vec3::splat(f32::NAN), &filter).is_err());
+    for at in 0..200 {
+        let start = Pose::from_position(random.vector(10.0));
+        let rest = world.cast_shape(&ShapeCast::along(&ball, start, Vec3::ZERO), &filter).unwrap();
+        // The back of the sheet is overlapped but stops nothing.
+        let solid = |shape: &ShapeRef<'_>| shape.geometry().is_convex();
+        let overlaps =
+            world.overlap_shape_any(&ball, &start, &QueryFilter { predicate: Some(&solid), ..filter }).unwrap();
+        assert!(rest.is_some() || !overlaps, "{at}");
+        let way = random.vector(1.0);
+        let endless = world.cast_ray(start.position, way, f32::INFINITY, &filter).unwrap();
+        let long = world.cast_ray(start.position, way, 1e6, &filter).unwrap();
+        assert_eq!(endless, long);
+        let far = ShapeCast::along(&ball, start, way * 1e6);
+        let near = ShapeCast::along(&ball, start, way * 1e2);
+        let [far, near] = [far, near].map(|cast| world.cast_shape(&cast, &filter).unwrap());
+        assert_eq!(far.map(|hit| hit.shape), near.map(|hit| hit.shape), "{at}");
+    }
 }

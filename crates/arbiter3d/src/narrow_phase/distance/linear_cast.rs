@@ -1,15 +1,16 @@
 //! When a convex shape that moves along a line first touches another: GJK on the moving difference.
 //!
-//! The difference `x2 − x1` of the cores moves by the displacement; it touches when the origin comes within the sum of the
-//! radii. In each round the extreme point `w` of the difference towards the origin gives a plane with normal `v` (from the
-//! closest point found so far) behind which all of the difference lies. While that plane is beyond the radius, the time goes
-//! on until it is there, which can jump over nothing; else `w` joins the simplex. So the search for the closest points and the
-//! advance in time are one loop. Source: van den Bergen, "Ray Casting against General Convex Objects with Application to
-//! Continuous Collision Detection", 2004.
+//! The difference `x2 − x1` of the cores moves by the displacement; it touches when the origin comes within the sum of
+//! the radii. In each round the extreme point `w` of the difference towards the origin gives a plane with normal `v`
+//! (from the closest point found so far) behind which all of the difference lies. While that plane is beyond the
+//! radius, the time goes on until it is there, which can jump over nothing; else `w` joins the simplex. So the search
+//! for the closest points and the advance in time are one loop. Source: van den Bergen, "Ray Casting against General
+//! Convex Objects with Application to Continuous Collision Detection", 2004.
 //!
-//! The time stops a thin *shell* before the surfaces touch, where the direction between the closest points still has its
-//! digits. There the closest points are found to the end, and one last advance along their direction closes the shell: exact
-//! for faces, edges and corners, for round surfaces early by a share of the shell. All in `f64`, as in the parent module.
+//! The time stops a thin *shell* before the surfaces touch, where the direction between the closest points still has
+//! its digits. There the closest points are found to the end, and one last advance along their direction closes the
+//! shell: exact for faces, edges and corners, for round surfaces early by a share of the shell. All in `f64`, as in the
+//! parent module.
 
 use super::{Closest, Corner, Placed, Simplex, Support, larger};
 use crate::math::{Pose, Real, Vec3};
@@ -48,8 +49,8 @@ pub(crate) struct CastPoint {
     pub point1: Vec3,
 }
 
-/// Moves shape 2, placed in the frame of shape 1 by `pose`, along `displacement` up to the share `limit` of it. `size` is that
-/// of the moving shape, metres: what is exact is relative to it.
+/// Moves shape 2, placed in the frame of shape 1 by `pose`, along `displacement` up to the share `limit` of it. `size`
+/// is that of the moving shape, metres: what is exact is relative to it.
 pub(crate) fn linear_cast(
     (shape1, shape2): (&Support, &Support),
     pose: &Pose,
@@ -172,7 +173,10 @@ impl Search<'_> {
         if closing <= 0.0 {
             return Cast::Miss;
         }
-        let time = self.time + larger(gap, 0.0) / closing;
+        // The plane, not the distance: it is as far away but for smooth shapes that took too many rounds, and never too
+        // far.
+        let plane = normal.dot(self.placed.corner(-v).difference) - self.radius;
+        let time = self.time + larger(plane, 0.0) / closing;
         if time > self.limit {
             return Cast::Miss;
         }

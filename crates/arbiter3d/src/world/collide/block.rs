@@ -70,6 +70,10 @@ impl<'a> BlockPairs<'a> {
     }
 }
 
+/// A bullet that moves farther in a step than this share of its inner radius is left to its flight: a little more than
+/// what makes a body fast, since contacts may slow it down until then.
+const FLIGHT: Real = 0.6;
+
 /// A list with room for the pairs of a block.
 type Queue<T> = FixedList<T, PAIRS_PER_BLOCK>;
 
@@ -434,6 +438,9 @@ impl CollideContext<'_> {
     /// Against what stands still, continuous collision does the looking ahead, unless something bounces: that has to leave from
     /// the surface. Contacts that are far apart would be hit one after the other, substep by substep, and a long body that
     /// hits so is thrown up by blows none of which bounces (measured: falling trunks of 25 m, by 1.4 m).
+    ///
+    /// Spin is left out of how fast they move: heaps of tumbling rocks would take 6 % more instructions for contacts that seldom
+    /// come to touch, and thin rods, whose size is their thickness, would see no farther.
     #[inline(always)]
     fn margin(&self, pair: &Pair) -> Real {
         if pair.sensor {
@@ -508,11 +515,28 @@ impl CollideContext<'_> {
         pair.bodies.map(|body| self.solver.masses[body as usize].rotation)
     }
 
+    /// How far a pair may close in a step for its contact to begin here. What comes faster is left to the flight of a bullet
+    /// that will be swept in this step: stopping it here would lose the time that it has left after the bounce.
+    fn most_closing(&self, pair: &Pair) -> Real {
+        let mut most = Real::INFINITY;
+        for &index in &pair.bodies {
+            let body = &self.bodies[index as usize];
+            if body.bullet && body.continuous && self.settings.continuous {
+                let least = FLIGHT * body.inner_radius;
+                if self.solver.states[index as usize].linear_velocity.length() * self.dt > least {
+                    most = min(least, most);
+                }
+            }
+        }
+        most
+    }
+
     /// Whether a pair without arbiter touches, or closes fast enough to touch within this step.
     fn begins(&self, pair: &Pair, places: &Places) -> bool {
         let [(v1, a1), (v2, a2)] =
             pair.bodies.map(|body| (&self.solver.states[body as usize], &self.solver.motions[body as usize]));
         let [rotation1, rotation2] = self.rotations(pair);
+        let most_closing = self.most_closing(pair);
         places.points[..places.count].iter().any(|point| {
             if point.separation <= 0.0 {
                 return true;
@@ -521,7 +545,7 @@ impl CollideContext<'_> {
             let velocity2 = v2.linear_velocity + v2.angular_velocity.cross(rotation2.rotate(point.anchor2));
             let speed =
                 point.normal.dot(velocity2 - velocity1) + point.normal.dot(a2.acceleration - a1.acceleration) * self.dt;
-            point.separation + speed * self.dt <= 0.0
+            point.separation + speed * self.dt <= 0.0 && -speed * self.dt <= most_closing
         })
     }
 }

@@ -200,6 +200,10 @@ impl World {
         if [arbiter.body1, arbiter.body2] == ids {
             let filler = Filler::new((&self.shapes, &self.bodies), &self.solver_bodies, &self.scaled, &self.filters);
             let pair = &mut self.pairs[begin.pair as usize];
+            if arbiter.pair == NONE {
+                self.arbiters.custom -= 1; // it ends with its pair now
+            }
+            let arbiter = self.arbiters.at_mut(index);
             (arbiter.pair, pair.arbiter) = (begin.pair, index);
             filler.fill(begin, pair, &mut arbiter.data);
         }

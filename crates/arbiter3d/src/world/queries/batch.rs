@@ -1,8 +1,8 @@
 //! Many rays or casts in one call, on several threads.
 //!
-//! Queries only read the world, so each thread takes pieces of the list until none is left and writes the answers where they
-//! belong: they are the same, in the same order, for any number of threads. The threads are started for the call: the pool of
-//! the step belongs to whoever steps the world, and a start costs less than the queries of one piece.
+//! Queries only read the world, so each thread takes pieces of the list until none is left and writes the answers where
+//! they belong: they are the same, in the same order, for any number of threads. The threads are started for the call:
+//! the pool of the step belongs to whoever steps the world, and a start costs less than the queries of one piece.
 
 use super::rays::checked_ray;
 use super::{CastHit, QueryFilter, RayHit, casts::checked_cast};
@@ -17,8 +17,8 @@ const RAYS: usize = 128;
 const CASTS: usize = 32;
 
 impl World {
-    /// The first hit of each ray, as [`World::cast_ray`] gives it, computed on [`threads`](crate::WorldSettings::threads)
-    /// threads.
+    /// The first hit of each ray, as [`World::cast_ray`] gives it, computed on
+    /// [`threads`](crate::WorldSettings::threads) threads.
     ///
     /// ```
     /// use arbiter3d::{BodyId, QueryFilter, Ray, Shape, ShapeDefinition, World, math::Vec3};
@@ -38,8 +38,8 @@ impl World {
         Ok(hits)
     }
 
-    /// As [`World::cast_rays`] into a list of your own, which is overwritten: no allocation once it is large enough, but for the
-    /// threads.
+    /// As [`World::cast_rays`] into a list of your own, which is overwritten: no allocation once it is large enough,
+    /// but for the threads.
     ///
     /// # Errors
     /// As [`World::cast_rays`].

@@ -39,8 +39,8 @@ pub struct CastHit {
     pub normal: Vec3,
     /// Share of the way travelled, 0 to 1; 0 where the shapes overlap at the start.
     pub fraction: Real,
-    /// How deep the shapes overlap at the start, metres along the normal; 0 for all other hits, and where the narrow phase
-    /// knows no depth (two meshes).
+    /// How deep the shapes overlap at the start, metres along the normal; 0 for all other hits, and where the narrow
+    /// phase knows no depth (two meshes).
     pub depth: Real,
 }
 
@@ -52,12 +52,12 @@ impl CastHit {
 }
 
 impl World {
-    /// The first shape that a moving shape touches. Shapes that it overlaps at the start count, at fraction 0; of those the
-    /// deepest. Of shapes touched at the same time the oldest.
+    /// The first shape that a moving shape touches. Shapes that it overlaps at the start count, at fraction 0; of those
+    /// the deepest. Of shapes touched at the same time the oldest.
     ///
-    /// The fraction is early, never late, by no more than 10⁻⁴ of the moving shape's size. Shapes that touch at the start but
-    /// part do not count. Method: van den Bergen, "Ray Casting against General Convex Objects", 2004; conservative advancement
-    /// where the shape turns.
+    /// The fraction is early, never late, by no more than 10⁻⁴ of the moving shape's size. Shapes that touch at the
+    /// start but part do not count. Method: van den Bergen, "Ray Casting against General Convex Objects", 2004;
+    /// conservative advancement where the shape turns.
     ///
     /// # Errors
     /// If a pose is not finite, or a rotation not of unit length.
@@ -65,8 +65,8 @@ impl World {
         Ok(self.first_touched(&checked_cast(cast)?, filter))
     }
 
-    /// All shapes that a moving shape touches or overlaps at the start, each once, in the order in which it would meet them if
-    /// nothing stopped it.
+    /// All shapes that a moving shape touches or overlaps at the start, each once, in the order in which it would meet
+    /// them if nothing stopped it.
     ///
     /// # Errors
     /// As [`World::cast_shape`].

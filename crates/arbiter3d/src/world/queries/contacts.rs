@@ -28,13 +28,14 @@ pub struct ShapeContacts {
     pub shape: ShapeId,
     /// What it is made of.
     pub material: Material,
-    /// The contact points, world: `point1` is on the world's shape, normals point from there to the shape that was asked about.
+    /// The contact points, world: `point1` is on the world's shape, normals point from there to the shape that was
+    /// asked about.
     pub manifold: Manifold,
 }
 
 impl World {
-    /// Contacts of a shape placed by `pose` with the shapes of the world that are closer than `margin` (metres, zero or more),
-    /// oldest first: up to four points each, as the step would find them.
+    /// Contacts of a shape placed by `pose` with the shapes of the world that are closer than `margin` (metres, zero or
+    /// more), oldest first: up to four points each, as the step would find them.
     ///
     /// # Errors
     /// If the pose is not finite, its rotation not of unit length, or the margin not finite or negative.
@@ -54,7 +55,7 @@ impl World {
                 let own = &self.shapes[slot as usize];
                 let manifold = placed_manifold((&own.geometry, &self.placed(slot)), (shape, &pose), margin);
                 if !manifold.points().is_empty() {
-                    let (body, material) = (self.body_id(own.body), own.material);
+                    let (body, material) = (self.body_id(own.body), *own.surface(manifold.materials()[0]));
                     found.push(ShapeContacts { body, shape: own.id, material, manifold });
                 }
             }
@@ -64,7 +65,8 @@ impl World {
         Ok(found)
     }
 
-    /// Contact points of two shapes of the world that are closer than `margin` (metres, zero or more), world: `point1` is on
+    /// Contact points of two shapes of the world that are closer than `margin` (metres, zero or more), world: `point1`
+    /// is on
     /// `shape1`, normals point from there to `shape2`. Filters and joints count for nothing.
     ///
     /// # Errors

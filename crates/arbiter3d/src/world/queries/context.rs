@@ -1,4 +1,5 @@
-//! The queries that listeners and contact providers use most, said to their context. All others: [`StepContext::world`].
+//! The queries that listeners and contact providers use most, said to their context. All others:
+//! [`StepContext::world`].
 
 use super::{CastHit, PointHit, QueryFilter, RayHit};
 use crate::error::Error;

@@ -1,8 +1,8 @@
 //! Questions to the world: rays, casts of shapes, overlaps, distances, contacts.
 //!
-//! The broad phase finds the shapes whose boxes may matter, nearest first where there is such an order, and `query` asks each
-//! of them. Answers do not depend on the order of the trees: hits at the same fraction, or shapes at the same distance, come in
-//! the order of their ids. Nothing here changes the world, so any number of threads may ask at once.
+//! The broad phase finds the shapes whose boxes may matter, nearest first where there is such an order, and `query`
+//! asks each of them. Answers do not depend on the order of the trees: hits at the same fraction, or shapes at the same
+//! distance, come in the order of their ids. Nothing here changes the world, so any number of threads may ask at once.
 
 mod batch;
 mod casts;
@@ -32,8 +32,10 @@ impl World {
     }
 
     /// What the surface of a shape is made of at a part of it.
-    fn material_at(&self, slot: u32, _child: Option<u32>, _triangle: Option<u32>) -> Material {
-        self.shapes[slot as usize].material
+    fn material_at(&self, slot: u32, _child: Option<u32>, triangle: Option<u32>) -> Material {
+        let shape = &self.shapes[slot as usize];
+        let number = triangle.map_or(0, |triangle| shape.geometry.triangle_material(triangle));
+        *shape.surface(number)
     }
 }
 

@@ -46,8 +46,8 @@ impl PointHit {
 }
 
 impl World {
-    /// The point of the world that is closest to a point, no farther than `max_distance` (metres, may be infinite). Inside a
-    /// shape that is the point itself. Of shapes at the same distance, the oldest.
+    /// The point of the world that is closest to a point, no farther than `max_distance` (metres, may be infinite).
+    /// Inside a shape that is the point itself. Of shapes at the same distance, the oldest.
     ///
     /// # Errors
     /// If the point is not finite, or the distance is NaN or negative.
@@ -67,8 +67,8 @@ impl World {
         Ok(best)
     }
 
-    /// The `count` shapes closest to a point, no farther than `max_distance` (metres, may be infinite), nearest first; at the
-    /// same distance, the oldest first.
+    /// The `count` shapes closest to a point, no farther than `max_distance` (metres, may be infinite), nearest first;
+    /// at the same distance, the oldest first.
     ///
     /// ```
     /// use arbiter3d::{BodyId, QueryFilter, Shape, ShapeDefinition, World, math::Vec3};
@@ -104,8 +104,8 @@ impl World {
         Ok(best)
     }
 
-    /// The shape of the world that is closest to a shape placed by `pose`, no farther than `max_distance` (metres, may be
-    /// infinite); of overlapping ones the deepest. Of shapes at the same distance, the oldest.
+    /// The shape of the world that is closest to a shape placed by `pose`, no farther than `max_distance` (metres, may
+    /// be infinite); of overlapping ones the deepest. Of shapes at the same distance, the oldest.
     ///
     /// # Errors
     /// If the pose is not finite, its rotation not of unit length, or the distance is NaN or negative.
@@ -132,8 +132,8 @@ impl World {
         Ok(best)
     }
 
-    /// Distance and closest points of two shapes of the world; `None` where they are farther apart than `max_distance` (metres,
-    /// may be infinite). Negative where they overlap: see [`distance`].
+    /// Distance and closest points of two shapes of the world; `None` where they are farther apart than `max_distance`
+    /// (metres, may be infinite). Negative where they overlap: see [`distance`].
     ///
     /// # Errors
     /// If a shape is unknown, or the distance is NaN or negative.

@@ -10,13 +10,15 @@ use crate::shape::Shape;
 use crate::world::World;
 
 impl World {
-    /// Shapes whose boxes overlap `aabb`, oldest first. The shapes themselves may be beside it: see [`World::overlap_shape`].
+    /// Shapes whose boxes overlap `aabb`, oldest first. The shapes themselves may be beside it: see
+    /// [`World::overlap_shape`].
     #[must_use]
     pub fn overlap_aabb(&self, aabb: &Aabb, filter: &QueryFilter<'_>) -> Vec<ShapeId> {
         self.overlapping(aabb, filter, |_| true)
     }
 
-    /// Shapes that share a point with a shape placed by `pose`, oldest first. Meshes count as surfaces, seen from both sides.
+    /// Shapes that share a point with a shape placed by `pose`, oldest first. Meshes count as surfaces, seen from both
+    /// sides.
     ///
     /// ```
     /// use arbiter3d::{BodyId, QueryFilter, Shape, ShapeDefinition, World, math::{Pose, Vec3}};

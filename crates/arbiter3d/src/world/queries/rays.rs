@@ -48,8 +48,8 @@ pub(super) struct Found {
 }
 
 impl World {
-    /// The first shape that a ray meets: from `origin` along `direction` (any length), up to `max_fraction` times it. Of shapes
-    /// hit at the same fraction, the oldest.
+    /// The first shape that a ray meets: from `origin` along `direction` (any length), up to `max_fraction` times it.
+    /// Of shapes hit at the same fraction, the oldest.
     ///
     /// # Errors
     /// If the origin or the direction is not finite, or the fraction is NaN or negative.
