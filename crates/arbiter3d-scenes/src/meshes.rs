@@ -79,6 +79,57 @@ pub fn torus(ring_segments: usize, tube_segments: usize, major: Real, tube: Real
     (vertices, triangles)
 }
 
+/// A gear about the z axis with involute teeth of 25°, from `-half_width` to `half_width`; a tooth lies on the x axis. The
+/// pitch circle has the radius `module · teeth / 2`; teeth are 3 % thinner than their gaps.
+#[must_use]
+pub fn gear(teeth: usize, module: Real, half_width: Real) -> MeshData {
+    let profile = gear_profile(teeth, f64::from(module));
+    let count = profile.len() as u32;
+    let mut vertices: Vec<Vec3> = profile.iter().map(|&[x, y]| Vec3::new(x, y, -half_width)).collect();
+    vertices.extend(profile.iter().map(|&[x, y]| Vec3::new(x, y, half_width)));
+    vertices.extend([Vec3::new(0.0, 0.0, -half_width), Vec3::new(0.0, 0.0, half_width)]);
+    let mut triangles = Vec::with_capacity(4 * profile.len());
+    for i in 0..count {
+        let next = (i + 1) % count;
+        triangles.push([2 * count, next, i]);
+        triangles.push([2 * count + 1, count + i, count + next]);
+        triangles.push([i, next, count + next]);
+        triangles.push([i, count + next, count + i]);
+    }
+    (vertices, triangles)
+}
+
+/// The outline of a gear, counter-clockwise.
+fn gear_profile(teeth: usize, module: f64) -> Vec<[Real; 2]> {
+    const FLANK_POINTS: usize = 6;
+    let pitch = 0.5 * module * teeth as f64;
+    let (tip, root) = (pitch + 0.9 * module, pitch - 1.15 * module);
+    let pressure = 25.0_f64.to_radians();
+    let base = pitch * libm::cos(pressure);
+    let unwound = |radius: f64| {
+        let t = if radius > base { ((radius / base) * (radius / base) - 1.0).sqrt() } else { 0.0 };
+        t - libm::atan(t)
+    };
+    let step = std::f64::consts::TAU / teeth as f64;
+    let half_angle = |radius: f64| 0.2463 * step + unwound(pitch) - unwound(radius);
+    let lowest = if base > root { base } else { root };
+    let mut flank: Vec<[f64; 2]> = if base > root { vec![[root, half_angle(base) + 0.03 * step]] } else { Vec::new() };
+    for k in 0..FLANK_POINTS {
+        let radius = lowest + (tip - lowest) * k as f64 / (FLANK_POINTS - 1) as f64;
+        flank.push([radius, half_angle(radius)]);
+    }
+    let mut profile = Vec::with_capacity(teeth * 2 * flank.len());
+    for tooth in 0..teeth {
+        let middle = step * tooth as f64;
+        let rising = flank.iter().map(|&[radius, angle]| (radius, middle - angle));
+        let falling = flank.iter().rev().map(|&[radius, angle]| (radius, middle + angle));
+        let point =
+            |(radius, angle): (f64, f64)| [(radius * libm::cos(angle)) as Real, (radius * libm::sin(angle)) as Real];
+        profile.extend(rising.chain(falling).map(point));
+    }
+    profile
+}
+
 /// Corners of an upright prism with `sides` sides between the heights `low` and `high`: a cylinder of hulls.
 #[must_use]
 pub fn prism(sides: usize, radius: Real, low: Real, high: Real) -> Vec<Vec3> {

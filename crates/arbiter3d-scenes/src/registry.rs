@@ -294,6 +294,18 @@ pub static SCENES: &[Scene] = &[
         build: scenes::character::character_course,
     },
     Scene {
+        name: "gears",
+        description: "two gears, meshes of 12 and 24 teeth: the small one drives the large one",
+        size: Size::FIXED,
+        build: scenes::gears_and_tiles::gears,
+    },
+    Scene {
+        name: "height_field_tiles",
+        description: "200 mixed bodies fall on 3 × 3 height fields side by side",
+        size: Size::new("bodies", 200, 100_000),
+        build: scenes::gears_and_tiles::height_field_tiles,
+    },
+    Scene {
         name: "one_way_platforms",
         description: "ten bodies are thrown up through one-way platforms and stand each on its floor; a lift passes and carries",
         size: Size::new("columns", 10, 100_000),

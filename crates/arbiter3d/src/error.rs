@@ -120,9 +120,6 @@ pub enum Error {
         /// The slots in use, as bits.
         mask: u8,
     },
-    /// A mesh on a dynamic body.
-    #[error("a triangle mesh has no inside: attach it to a static or kinematic body, or use convex hulls")]
-    MeshNotDynamic,
     /// A velocity, force or impulse on a body that does not take it.
     #[error("{id:?} is static: it has no velocity; make it kinematic or dynamic first")]
     StaticBody {

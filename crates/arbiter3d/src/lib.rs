@@ -52,9 +52,9 @@ pub use character::{
 };
 pub use query::{Ray, ShapeCast, ShapeDistance, ShapeHit, cast_ray, distance, overlaps};
 pub use shape::{
-    Capsule, Cone, ConvexHull, ConvexShape, Cuboid, Custom, Cylinder, HalfEdge, HalfSpace, MassProperties, MeshRayHit,
-    MeshSides, Plane, PointCloud, Rounded, Shape, ShapeError, Sphere, TaperedCapsule, Transformed, Triangle,
-    TriangleMesh,
+    Capsule, Cone, ConvexHull, ConvexShape, Cuboid, Custom, Cylinder, FieldDiagonals, FieldSide, HalfEdge, HalfSpace,
+    HeightField, MassProperties, MeshRayHit, MeshSides, Plane, PointCloud, Rounded, Shape, ShapeError, Sphere,
+    TaperedCapsule, Transformed, Triangle, TriangleMesh,
 };
 pub use simd::{SimdLevel, UnknownSimdLevel};
 pub use vehicle::{

@@ -3,7 +3,9 @@
 mod common;
 
 use arbiter3d::math::Vec3;
-use arbiter3d::{BodyDefinition, BodyId, BodyKind, Error, MeshSides, Shape, ShapeDefinition, TriangleMesh, World};
+use arbiter3d::{
+    BodyDefinition, BodyId, BodyKind, Error, MeshSides, Shape, ShapeDefinition, ShapeError, TriangleMesh, World,
+};
 use common::*;
 
 /// A grid of `cells` × `cells` squares of this size about the origin, solid from above.
@@ -198,16 +200,19 @@ fn a_kinematic_mesh_carries_riders() {
     assert_near(position(&world, tray).y, 1.0, 1e-3, "height of the tray");
 }
 
-/// Meshes have no inside: they do not go on dynamic bodies, and their carriers cannot become dynamic.
+/// Open meshes have no inside: they do not go on dynamic bodies, and their carriers cannot become dynamic.
 #[test]
 fn meshes_do_not_go_on_dynamic_bodies() {
     let mut world: World = world();
     let mesh = ShapeDefinition::new(grid(2, 1.0, |_, _| 0.0, MeshSides::One));
     let body = world.add_body(&BodyDefinition::dynamic()).unwrap();
-    assert_eq!(world.add_shape(body, &mesh), Err(Error::MeshNotDynamic));
+    assert_eq!(world.add_shape(body, &mesh), Err(Error::Shape(ShapeError::OpenMesh { edges: 8 })));
     let fixed = world.add_body(&BodyDefinition::fixed()).unwrap();
     world.add_shape(fixed, &mesh).unwrap();
-    assert_eq!(world.body_mut(fixed).unwrap().set_kind(BodyKind::Dynamic), Err(Error::MeshNotDynamic));
+    assert_eq!(
+        world.body_mut(fixed).unwrap().set_kind(BodyKind::Dynamic),
+        Err(Error::Shape(ShapeError::OpenMesh { edges: 8 }))
+    );
     assert_eq!(world.body(fixed).unwrap().kind(), BodyKind::Static);
     world.body_mut(fixed).unwrap().set_kind(BodyKind::Kinematic).unwrap();
 }

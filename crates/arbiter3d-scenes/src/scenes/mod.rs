@@ -7,6 +7,7 @@ pub(crate) mod drums;
 pub(crate) mod fast;
 pub(crate) mod fields;
 pub(crate) mod fluids;
+pub(crate) mod gears_and_tiles;
 pub(crate) mod piles;
 pub(crate) mod stacks;
 pub(crate) mod surfaces;

@@ -42,6 +42,8 @@ fn scenes_have_their_published_counts() {
         ("character_course", None, 1),
         ("one_way_platforms", None, 11),
         ("conveyors", None, 15),
+        ("gears", None, 1),
+        ("height_field_tiles", None, 200),
     ];
     for (name, size, count) in counts {
         assert_eq!(dynamic(&built(name, size).world).len(), count, "{name}");

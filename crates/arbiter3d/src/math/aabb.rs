@@ -82,6 +82,12 @@ impl Aabb {
             & (other.min.z <= self.max.z)
     }
 
+    /// Whether a point lies inside or on the border.
+    #[inline(always)]
+    pub(crate) fn holds(&self, point: Vec3) -> bool {
+        self.contains(&Self::new(point, point))
+    }
+
     /// Whether `other` lies inside.
     #[inline(always)]
     #[must_use]

@@ -29,6 +29,7 @@ impl ManifoldPoint {
 pub struct Manifold {
     points: [ManifoldPoint; 4],
     count: u8,
+    materials: [u8; 2],
 }
 
 impl Manifold {
@@ -36,12 +37,14 @@ impl Manifold {
     pub const EMPTY: Self = Self {
         points: [ManifoldPoint { point1: Vec3::ZERO, normal: Vec3::ZERO, separation: 0.0, feature: 0 }; 4],
         count: 0,
+        materials: [0; 2],
     };
 
     /// Removes all points.
     #[inline(always)]
     pub fn clear(&mut self) {
         self.count = 0;
+        self.materials = [0; 2];
     }
 
     /// Adds a point.
@@ -59,6 +62,18 @@ impl Manifold {
     #[must_use]
     pub fn points(&self) -> &[ManifoldPoint] {
         &self.points[..self.count as usize]
+    }
+
+    /// Of shape 1 and of shape 2, which of its palette's materials touches: that of the triangle with the deepest point. Zero
+    /// for shapes of one material.
+    #[inline(always)]
+    #[must_use]
+    pub fn materials(&self) -> [u8; 2] {
+        self.materials
+    }
+
+    pub(crate) fn set_materials(&mut self, materials: [u8; 2]) {
+        self.materials = materials;
     }
 
     /// The points, to change.

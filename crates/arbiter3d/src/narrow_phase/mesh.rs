@@ -17,7 +17,7 @@ use super::triangle_lanes::Near;
 use super::triangle_solid::Faceted;
 use super::{Manifold, ManifoldPoint};
 use crate::math::{Aabb, Mat3, Pose, Real, Vec3, abs3, min};
-use crate::shape::{LEAF, Leaves, MeshSides, Shape, TriangleMesh};
+use crate::shape::{LEAF, Leaves, MeshSides, Shape, Surface};
 use crate::simd::{LaneVec3, Lanes};
 
 /// How far behind a one-sided triangle a centre may be and still be pushed out in front, as a share of the scale of
@@ -25,7 +25,7 @@ use crate::simd::{LaneVec3, Lanes};
 const BEHIND: Real = 0.1;
 
 /// Contacts of a mesh (shape 1, whose frame the manifold is in) and a convex shape placed in that frame by `pose`.
-pub(crate) fn collide(mesh: &TriangleMesh, convex: &Shape, pose: &Pose, margin: Real, manifold: &mut Manifold) {
+pub(crate) fn collide(mesh: Surface<'_>, convex: &Shape, pose: &Pose, margin: Real, manifold: &mut Manifold) {
     manifold.clear();
     let aabb = convex.aabb(pose).expand(margin);
     let mut contact = Contact { mesh, pose, aabb, margin, manifold };
@@ -43,7 +43,7 @@ pub(crate) fn collide(mesh: &TriangleMesh, convex: &Shape, pose: &Pose, margin: 
 
 /// A convex shape near a mesh.
 struct Contact<'a> {
-    mesh: &'a TriangleMesh,
+    mesh: Surface<'a>,
     pose: &'a Pose,
     aabb: Aabb,
     margin: Real,
@@ -64,7 +64,16 @@ impl Contact<'_> {
             reach.second_look = true;
             self.touch_all(solid, &frame, &reach, &mut candidates);
         }
-        candidates.choose(|candidate| self.manifold.push(point_in_mesh(self.mesh, &frame, candidate)));
+        let (mesh, manifold, mut deepest) = (self.mesh, &mut *self.manifold, (Real::MAX, 0));
+        candidates.choose(|candidate| {
+            if candidate.separation < deepest.0 {
+                deepest = (candidate.separation, candidate.triangle as usize);
+            }
+            manifold.push(point_in_mesh(mesh, &frame, candidate));
+        });
+        if deepest.0 < Real::MAX {
+            manifold.set_materials([mesh.material(deepest.1), 0]);
+        }
     }
 
     /// Adds the points of all triangles near the shape. Returns whether one might overlap that gave no point.
@@ -90,7 +99,7 @@ impl Contact<'_> {
 
 /// Hands on the triangles that are near a shape.
 struct Sieve<'a, S> {
-    mesh: &'a TriangleMesh,
+    mesh: Surface<'a>,
     near: Near<'a>,
     solid: &'a mut S,
     out: &'a mut Candidates,
@@ -121,7 +130,7 @@ impl<S: Solid> Leaves for Sieve<'_, S> {
 }
 
 /// A candidate in the frame of the mesh, with the exact normal of its triangle.
-fn point_in_mesh(mesh: &TriangleMesh, frame: &Frame, candidate: &Candidate) -> ManifoldPoint {
+fn point_in_mesh(mesh: Surface<'_>, frame: &Frame, candidate: &Candidate) -> ManifoldPoint {
     let turned = frame.rotation * candidate.normal;
     let (separation, feature) = (candidate.separation, candidate.feature);
     let point1 = frame.rotation * candidate.position + frame.position;

@@ -25,6 +25,15 @@ pub(super) struct Candidate {
     pub(super) feature: u32,
     /// Internal number of the triangle whose normal this is (on either side of it), or [`NO_FACET`].
     pub(super) facet: u32,
+    /// Internal number of the triangle that touches.
+    pub(super) triangle: u32,
+}
+
+/// A number for a corner by where it is: the same from step to step, whichever triangle brings it.
+pub(super) fn position_number(corner: Vec3) -> u32 {
+    let [x, y, z] = corner.to_array().map(Real::to_bits);
+    let mixed = (x ^ 0x5bd1_e995).wrapping_mul(0x9e37_79b1).rotate_left(15) ^ y.wrapping_mul(0x85eb_ca6b);
+    (mixed.rotate_left(13) ^ z).wrapping_mul(0x2c1b_3c6d) ^ mixed >> 16
 }
 
 /// Points that the buffer holds.
@@ -70,7 +79,8 @@ struct Groups {
 
 impl Candidates {
     pub(super) fn new(tolerance: Real) -> Self {
-        let none = Candidate { position: Vec3::ZERO, normal: Vec3::ZERO, separation: 0.0, feature: 0, facet: NO_FACET };
+        let (position, normal) = (Vec3::ZERO, Vec3::ZERO);
+        let none = Candidate { position, normal, separation: 0.0, feature: 0, facet: NO_FACET, triangle: 0 };
         Self { list: [none; CAPACITY], count: 0, tolerance, deepest: Real::MAX }
     }
 

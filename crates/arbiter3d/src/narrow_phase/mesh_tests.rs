@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::math::{Rotation, max, min};
-use crate::shape::ShapeError;
+use crate::shape::{HeightField, ShapeError, TriangleMesh};
 
 /// Numbers from a linear congruential generator, in `[-1, 1)`.
 struct Random(u64);
@@ -64,7 +64,7 @@ fn block(half: Vec3, cuts: u32) -> TriangleMesh {
 
 fn touch(mesh: &TriangleMesh, shape: &Shape, pose: &Pose) -> Manifold {
     let mut manifold = Manifold::EMPTY;
-    collide(mesh, shape, pose, 0.02, &mut manifold);
+    collide(Surface::Mesh(mesh), shape, pose, 0.02, &mut manifold);
     manifold
 }
 
@@ -541,10 +541,10 @@ fn extreme_numbers_are_survived() {
     for shape in some_shapes().unwrap() {
         let mut pose = Pose::new(Vec3::ZERO, random.rotation());
         pose.position.y = -lowest(&shape, &pose) - 0.01;
-        collide(&flat, &shape, &pose, 0.0, &mut manifold);
+        collide(Surface::Mesh(&flat), &shape, &pose, 0.0, &mut manifold);
         assert!(manifold.points().iter().any(|p| (p.separation + 0.01).abs() < 1e-5));
         pose.position.y += 0.011;
-        collide(&flat, &shape, &pose, 0.0, &mut manifold);
+        collide(Surface::Mesh(&flat), &shape, &pose, 0.0, &mut manifold);
         assert!(manifold.points().is_empty());
     }
 }
@@ -661,4 +661,46 @@ fn a_rim_bears_at_both_ends() {
         });
         assert!(low < -0.4 && high > 0.4, "roll {roll}: from {low} to {high}");
     }
+}
+
+/// Height fields of all diagonals, with holes: contacts of the four kinds of convex shapes are those of the mesh of the same
+/// triangles.
+#[test]
+fn a_height_field_answers_as_its_mesh_does() {
+    use crate::shape::{FieldDiagonals, FieldSide};
+    let mut random = Random(77);
+    let mut touches = 0;
+    for diagonals in [FieldDiagonals::Falling, FieldDiagonals::Rising, FieldDiagonals::Alternating] {
+        let heights = (0..30 * 30).map(|_| 0.15 * random.next()).collect();
+        let holes: Vec<bool> = (0..29 * 29).map(|cell| cell % 11 == 4).collect();
+        let mut field = HeightField::new(heights, 30, [0.4, 0.3]).unwrap().with_diagonals(diagonals);
+        field = field.with_holes(&holes).unwrap();
+        for side in [FieldSide::LowX, FieldSide::HighX, FieldSide::LowZ, FieldSide::HighZ] {
+            field = field.with_end(side);
+        }
+        let (points, triangles) = Shape::HeightField(field.clone().into()).triangulate(1);
+        let mesh = TriangleMesh::new(points, triangles).unwrap();
+        for shape in some_shapes().unwrap() {
+            for i in 0..200 {
+                let place = Vec3::new(5.8, 0.45, 4.35) + random.vector() * Vec3::new(6.0, 0.3, 4.5);
+                let pose = Pose::new(place, random.rotation());
+                let (mut found, expected) = (Manifold::EMPTY, touch(&mesh, &shape, &pose));
+                collide(Surface::Field(&field), &shape, &pose, 0.02, &mut found);
+                // Which four of many points are kept may depend on the order of the triangles; the deepest does not.
+                let deepest = |m: &Manifold| {
+                    let least = m.points().iter().map(|p| p.separation).fold(Real::MAX, min);
+                    *m.points().iter().find(|p| p.separation == least).unwrap()
+                };
+                if expected.points().is_empty() {
+                    assert!(found.points().is_empty(), "{i} {shape:?} {pose:?} {found:?}");
+                    continue;
+                }
+                touches += 1;
+                let (found, expected) = (deepest(&found), deepest(&expected));
+                assert!((found.separation - expected.separation).abs() < 1e-4, "{i} {shape:?} {found:?} {expected:?}");
+                assert!((found.normal - expected.normal).length() < 1e-4, "{i} {shape:?} {found:?} {expected:?}");
+            }
+        }
+    }
+    assert!(touches > 500, "{touches}");
 }

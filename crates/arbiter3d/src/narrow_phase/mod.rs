@@ -27,6 +27,7 @@ mod penetration;
 mod polyhedron;
 mod sphere;
 mod support;
+mod surfaces;
 mod time_of_impact;
 mod triangle;
 mod triangle_lanes;
@@ -40,7 +41,7 @@ pub(crate) use time_of_impact::{Sweep, gap, time_of_impact};
 pub use manifold::{Manifold, ManifoldPoint};
 
 use crate::math::{Pose, Real};
-use crate::shape::Shape;
+use crate::shape::{Shape, Surface};
 use crate::simd::SimdLevel;
 
 /// What a pair remembers between steps to find its contact faster: the last separating or reference feature.
@@ -60,7 +61,7 @@ pub struct PairCache {
 /// Finds the contacts of two shapes that are closer than `margin` (metres, zero or more).
 ///
 /// `pose` places shape 2 in the frame of shape 1; the manifold is in that frame, its normals point from shape 1 to
-/// shape 2. Two meshes never touch.
+/// shape 2.
 ///
 /// ```
 /// use arbiter3d::{Shape, math::{Pose, Vec3}, narrow_phase::{Manifold, PairCache, collide}};
@@ -109,7 +110,7 @@ fn rank(shape: &Shape) -> u8 {
         Shape::Cuboid(_) => 2,
         Shape::Hull(_) => 3,
         Shape::HalfSpace(_) => 6,
-        Shape::Mesh(_) => 5,
+        Shape::Mesh(_) | Shape::HeightField(_) => 5,
         _ => 4,
     }
 }
@@ -133,9 +134,18 @@ fn collide_sorted(
         (Shape::Hull(a), Shape::Capsule(b)) => capsule::hull_capsule(a, b, pose, margin, manifold),
         (Shape::Hull(a), Shape::Cuboid(b)) => hull::collide(level, (a, b), pose, margin, (cache, manifold)),
         (Shape::Hull(a), Shape::Hull(b)) => hull::collide(level, (a, &**b), pose, margin, (cache, manifold)),
-        (Shape::Mesh(a), convex) if convex.is_convex() => mesh::collide(a, convex, pose, margin, manifold),
         (Shape::HalfSpace(_), other) => half_space::collide(other, pose, margin, manifold),
+        (Shape::Mesh(_) | Shape::HeightField(_), other) => collide_surface(shape1, other, pose, margin, manifold),
         _ => general::collide((shape1, shape2), pose, margin, manifold),
+    }
+}
+
+/// A mesh or a height field against anything.
+fn collide_surface(shape1: &Shape, shape2: &Shape, pose: &Pose, margin: Real, manifold: &mut Manifold) {
+    match (Surface::of(shape1), Surface::of(shape2)) {
+        (Some(a), None) => mesh::collide(a, shape2, pose, margin, manifold),
+        (Some(a), Some(b)) => surfaces::collide((a, b), pose, margin, manifold),
+        _ => manifold.clear(),
     }
 }
 
@@ -145,6 +155,8 @@ fn mirror(pose: &Pose, manifold: &mut Manifold) {
         point.point1 = pose.transform_point(point.point2());
         point.normal = -pose.rotation.rotate(point.normal);
     }
+    let [a, b] = manifold.materials();
+    manifold.set_materials([b, a]);
 }
 
 #[cfg(test)]

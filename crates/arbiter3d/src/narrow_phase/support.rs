@@ -50,7 +50,7 @@ impl<'a> Support<'a> {
             Shape::Rounded(s) => Self::Rounded(s),
             Shape::Transformed(s) => Self::Transformed(s),
             Shape::Custom(s) => Self::Custom(s),
-            Shape::Mesh(_) | Shape::HalfSpace(_) => return None,
+            Shape::Mesh(_) | Shape::HeightField(_) | Shape::HalfSpace(_) => return None,
         })
     }
 

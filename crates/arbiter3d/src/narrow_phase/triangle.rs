@@ -9,7 +9,7 @@
 use super::mesh_points::{Candidate, Candidates, NO_FACET};
 use super::triangle_lanes::{Near, Planes};
 use crate::math::{Aabb, Mat3, Real, Vec3, abs3, clamp, max, max3, min, min3};
-use crate::shape::{Capsule, Facet, LEAF as LANES, Sphere, Surroundings, TriangleMesh};
+use crate::shape::{Capsule, Facet, LEAF as LANES, Sphere, Surface, Surroundings};
 use crate::simd::Lanes;
 
 /// Sine by which a normal may leave the range that an edge or a corner allows: rounding, not geometry.
@@ -44,9 +44,9 @@ pub(super) struct Reach {
 
 /// A triangle in the frame of the convex shape.
 pub(super) struct Triangle<'a> {
-    pub(super) mesh: &'a TriangleMesh,
+    pub(super) mesh: Surface<'a>,
     pub(super) frame: &'a Frame,
-    pub(super) around: &'a Surroundings,
+    pub(super) around: Surroundings,
     pub(super) index: u32,
     pub(super) corners: [Vec3; 3],
     /// Unit normal on the side of the shape's centre.
@@ -65,13 +65,13 @@ pub(super) struct Triangle<'a> {
 impl<'a> Triangle<'a> {
     /// The triangle as seen from its front (`side` 1) or back (−1).
     #[inline]
-    pub(super) fn new(mesh: &'a TriangleMesh, frame: &'a Frame, index: u32, side: Real) -> Self {
+    pub(super) fn new(mesh: Surface<'a>, frame: &'a Frame, index: u32, side: Real) -> Self {
         Self::of(mesh, frame, &mesh.facet(index as usize), (index, side))
     }
 
     /// As [`Triangle::new`], for those who have its corners at hand.
     #[inline]
-    pub(super) fn of(mesh: &'a TriangleMesh, frame: &'a Frame, facet: &Facet, (index, side): (u32, Real)) -> Self {
+    pub(super) fn of(mesh: Surface<'a>, frame: &'a Frame, facet: &Facet, (index, side): (u32, Real)) -> Self {
         let [a, b, c] = facet.corners();
         let first = a - frame.position;
         let corners =
@@ -225,13 +225,14 @@ impl<'a> Triangle<'a> {
             separation: height - radius,
             feature: feature_id(self.around.patch, feature),
             facet: self.index,
+            triangle: self.index,
         }
     }
 
     /// A point on an edge or a corner.
     pub(super) fn rim_candidate(&self, position: Vec3, normal: Vec3, separation: Real, feature: u32) -> Candidate {
         let feature = feature_id(self.around.id, feature);
-        Candidate { position, normal, separation, feature, facet: NO_FACET }
+        Candidate { position, normal, separation, feature, facet: NO_FACET, triangle: self.index }
     }
 }
 
@@ -261,7 +262,7 @@ impl Group {
 
     /// Visits the triangles one by one, and is empty then. Returns whether any visit returned true.
     #[inline(always)]
-    fn drain(&mut self, mesh: &TriangleMesh, frame: &Frame, mut visit: impl FnMut(&Triangle) -> bool) -> bool {
+    fn drain(&mut self, mesh: Surface<'_>, frame: &Frame, mut visit: impl FnMut(&Triangle) -> bool) -> bool {
         let mut any = false;
         for k in 0..std::mem::take(&mut self.count) {
             any |= visit(&Triangle::new(mesh, frame, self.indices[k], self.sides[k]));
@@ -287,14 +288,14 @@ pub(super) trait Solid {
     /// either, it is looked at again.
     fn touch_group(
         &mut self,
-        mesh: &TriangleMesh,
+        mesh: Surface<'_>,
         frame: &Frame,
         group: &mut Group,
         reach: &Reach,
         out: &mut Candidates,
     ) -> bool;
     /// Adds the points of triangles that were kept; returns as [`Solid::touch_group`].
-    fn finish(&mut self, _mesh: &TriangleMesh, _frame: &Frame, _reach: &Reach, _out: &mut Candidates) -> bool {
+    fn finish(&mut self, _mesh: Surface<'_>, _frame: &Frame, _reach: &Reach, _out: &mut Candidates) -> bool {
         false
     }
 }
@@ -331,7 +332,7 @@ impl<R: Round> Solid for R {
 
     fn touch_group(
         &mut self,
-        mesh: &TriangleMesh,
+        mesh: Surface<'_>,
         frame: &Frame,
         group: &mut Group,
         reach: &Reach,
@@ -397,9 +398,10 @@ fn touch_sphere(sphere: &Sphere, triangle: &Triangle, reach: &Reach, out: &mut C
         out.push(triangle.rim_candidate(point, normal, distance - sphere.radius(), i as u32));
         return false;
     }
-    // The neighbours have a nearer point. If rounding lost it between them, the face takes it.
+    // The neighbours have a nearer point. If rounding lost it between them, or the neighbour is another shape, the face takes
+    // it: right under the centre, for the normal of a ball goes through it (else a ball that rolls would be thrown up).
     if reach.second_look && distance < sphere.radius() {
-        out.push(triangle.face_candidate(point + triangle.normal * height, height, sphere.radius(), 0));
+        out.push(triangle.face_candidate(Vec3::ZERO, height, sphere.radius(), 0));
     }
     distance < sphere.radius()
 }
@@ -485,8 +487,7 @@ impl Capsule {
             let pair = SegmentPair::nearest(triangle.edge(i), (-end, end));
             if (pair.on_second - pair.on_first).length() < self.radius() {
                 let height = triangle.height(pair.on_second);
-                let above = pair.on_first + triangle.normal * height;
-                out.push(triangle.face_candidate(above, height, self.radius(), 8 + i as u32));
+                out.push(triangle.face_candidate(pair.on_second, height, self.radius(), 8 + i as u32));
             }
         }
     }

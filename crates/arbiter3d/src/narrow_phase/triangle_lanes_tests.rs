@@ -5,7 +5,7 @@ use crate::math::{Aabb, Pose, Rotation};
 use crate::narrow_phase::polyhedron::CuboidFeatures;
 use crate::narrow_phase::tests::Random;
 use crate::narrow_phase::triangle_lanes::Near;
-use crate::shape::{ConvexHull, Cuboid, Leaves};
+use crate::shape::{ConvexHull, Cuboid, Leaves, TriangleMesh};
 use crate::simd::{LaneVec3, Lanes, Wide};
 
 /// A rough surface: every edge is a ridge or a groove.
@@ -34,7 +34,7 @@ fn compare(solid: &Polyhedron, mesh: &TriangleMesh, frame: &Frame, indices: [u32
     EdgeSearch { search, found: &mut found }.find();
     let mut counts = [0; 3];
     for (k, &index) in indices.iter().enumerate() {
-        let triangle = Triangle::new(mesh, frame, index, 1.0);
+        let triangle = Triangle::new(Surface::Mesh(mesh), frame, index, 1.0);
         let mut underside = Underside::NONE;
         underside.turn_to(solid, triangle.normal, found.corner[k] as usize);
         let height = triangle.height(solid.vertices[underside.corner]);

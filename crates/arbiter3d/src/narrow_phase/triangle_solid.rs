@@ -19,7 +19,7 @@ use super::triangle::{Frame, Group, Reach, Solid, Triangle, feature_id, parallel
 use super::triangle_lanes::BACKWARD;
 use super::triangle_lanes::{EdgeSearch, FaceSearch, Near, Overlaps, Planes, Search};
 use crate::math::{Aabb, Real, Vec3, clamp, max, max3, min, min3};
-use crate::shape::{Facet, LEAF as LANES, TriangleMesh};
+use crate::shape::{Facet, LEAF as LANES, Surface};
 use crate::simd::{LaneVec3, Lanes};
 
 /// An edge, or the face, of a triangle lies level with its highest corner below this sine.
@@ -177,7 +177,7 @@ impl Solid for Faceted<'_> {
 
     fn touch_group(
         &mut self,
-        mesh: &TriangleMesh,
+        mesh: Surface<'_>,
         frame: &Frame,
         group: &mut Group,
         reach: &Reach,
@@ -206,7 +206,7 @@ impl Solid for Faceted<'_> {
         missing
     }
 
-    fn finish(&mut self, mesh: &TriangleMesh, frame: &Frame, reach: &Reach, out: &mut Candidates) -> bool {
+    fn finish(&mut self, mesh: Surface<'_>, frame: &Frame, reach: &Reach, out: &mut Candidates) -> bool {
         let count = std::mem::take(&mut self.pending.count);
         let mut found = self.pending.found;
         found.open[count..].fill(0.0);
@@ -652,6 +652,7 @@ impl Pair<'_> {
             separation: -depth,
             feature: feature_id(self.triangle.around.id, feature),
             facet: self.triangle.index,
+            triangle: self.triangle.index,
         });
     }
 }

@@ -7,7 +7,7 @@
 
 use crate::math::{Aabb, Pose, Real, Vec3, abs3, max, max3, min};
 use crate::narrow_phase::Support;
-use crate::shape::{Cuboid, Descent, LEAF, MeshSides, Shape, Slabs, TriangleMesh, box_distances};
+use crate::shape::{Cuboid, Descent, HeightField, LEAF, MeshSides, Shape, Slabs, TriangleMesh, box_distances};
 use crate::simd::{LaneVec3, Lanes};
 
 /// A convex part of a shape.
@@ -17,7 +17,7 @@ pub(crate) struct Part<'a> {
     pub pose: Option<Pose>,
     /// Child of a compound.
     pub child: Option<u32>,
-    /// Triangle of a mesh, as numbered by the user.
+    /// Triangle of a mesh, as numbered by the user, or of a height field.
     pub triangle: Option<u32>,
     /// Whether only its front is solid: the side from which the corners of the triangle wind counter-clockwise.
     pub one_sided: bool,
@@ -174,6 +174,7 @@ impl Path {
 pub(crate) fn visit_parts<'a>(shape: &'a Shape, region: &Region, mut visit: impl FnMut(&Part<'a>, Real) -> Real) {
     match shape {
         Shape::Mesh(mesh) => visit_triangles(mesh, region, &mut visit),
+        Shape::HeightField(field) => visit_field(field, region, &mut visit),
         Shape::HalfSpace(_) => visit_half_space(region, &mut visit),
         convex => {
             let limit = region.limit();
@@ -219,6 +220,17 @@ fn visit_triangles<'a>(mesh: &'a TriangleMesh, region: &Region, visit: &mut impl
             mesh.descend(*limit * *limit, &mut Around { mesh, aabb, visit });
         }
     }
+}
+
+fn visit_field<'a>(field: &'a HeightField, region: &Region, visit: &mut impl FnMut(&Part<'a>, Real) -> Real) {
+    let mut limit = region.limit();
+    field.for_each_facet(&region.bounds(), |index| {
+        if limit >= 0.0 {
+            let triangle = Some(index as u32);
+            let part = Part { triangle, one_sided: true, ..Part::whole(Support::Triangle(field.corners(index))) };
+            limit = visit(&part, limit);
+        }
+    });
 }
 
 fn triangle(mesh: &TriangleMesh, index: usize) -> Part<'_> {

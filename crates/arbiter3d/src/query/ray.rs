@@ -100,6 +100,11 @@ pub(crate) fn find(shape: &Shape, ray: &Ray) -> Option<PartHit> {
             let hit = ShapeHit { fraction: found.distance, normal: found.normal };
             return Some(PartHit { hit, child: None, triangle: Some(found.triangle) });
         }
+        Shape::HeightField(field) => {
+            let found = field.cast_ray(ray.origin, ray.direction, ray.max_fraction)?;
+            let hit = ShapeHit { fraction: found.distance, normal: found.normal };
+            return Some(PartHit { hit, child: None, triangle: Some(found.triangle) });
+        }
         other if other.is_convex() || matches!(other, Shape::HalfSpace(_)) => other.geometry().cast_ray(ray),
         other => return cast_parts(other, ray),
     };

@@ -11,12 +11,14 @@
 
 use super::geometry::Geometry;
 use super::mesh_edges::{Adjacency, Surface, Surroundings};
+use super::mesh_interior::Interior;
 use super::mesh_tree::{Descent, LEAF, Leaves, MeshTree, Slabs};
 use super::{MassProperties, ShapeError};
 use crate::math::{Aabb, Real, Vec3, max3, min3};
 use crate::query::{self, ShapeHit};
 use crate::simd::{LaneVec3, Lanes, Quad};
 use glam::DVec3;
+use std::sync::OnceLock;
 
 /// Which side of its triangles a mesh is solid on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -49,7 +51,7 @@ impl Facet {
     pub(crate) const NONE: Self = Self { quads: [[0.0; 4]; 3] };
 
     #[inline(always)]
-    fn new([a, b, c]: [Vec3; 3], normal: Vec3) -> Self {
+    pub(super) fn new([a, b, c]: [Vec3; 3], normal: Vec3) -> Self {
         Self { quads: [[a.x, a.y, a.z, b.x], [b.y, b.z, c.x, c.y], [c.z, normal.x, normal.y, normal.z]] }
     }
 
@@ -85,6 +87,11 @@ pub struct TriangleMesh {
     tree: MeshTree,
     /// In the order of the tree.
     surroundings: Vec<Surroundings>,
+    /// Of each of the user's triangles; empty if all are zero.
+    materials: Vec<u8>,
+    open_edges: usize,
+    /// Of a closed mesh, once it is asked for.
+    interior: OnceLock<Interior>,
 }
 
 impl TriangleMesh {
@@ -153,12 +160,42 @@ impl TriangleMesh {
         adjacency.close_seams(|point, gap, visit| {
             tree.query(&Aabb::from_center(point, Vec3::splat(gap)), |slot| visit(order[slot]));
         });
+        let open_edges = adjacency.open_edges();
         let surroundings = adjacency.finish(&order);
         vertices.reserve_exact(1);
         vertices.push(Vec3::ZERO);
         vertices.shrink_to_fit();
         triangles.shrink_to_fit();
-        Self { vertices, triangles, sides, tree, surroundings }
+        Self {
+            vertices,
+            triangles,
+            sides,
+            tree,
+            surroundings,
+            materials: Vec::new(),
+            open_edges,
+            interior: OnceLock::new(),
+        }
+    }
+
+    /// The same with materials: for each triangle as given which of
+    /// [`ShapeDefinition::palette`](crate::ShapeDefinition::palette).
+    ///
+    /// # Errors
+    /// If there are not as many as triangles.
+    pub fn with_materials(mut self, materials: Vec<u8>) -> Result<Self, ShapeError> {
+        let (given, expected) = (materials.len(), self.triangles.len());
+        if given != expected {
+            return Err(ShapeError::WrongCount { what: "materials", given, expected });
+        }
+        self.materials = materials;
+        Ok(self)
+    }
+
+    /// The materials of the triangles as given; empty if all are zero.
+    #[must_use]
+    pub fn materials(&self) -> &[u8] {
+        &self.materials
     }
 
     /// Corner positions, metres.
@@ -171,6 +208,18 @@ impl TriangleMesh {
     #[must_use]
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
+    }
+
+    /// Edges that no triangle closes, or along which two triangles wind the same way; corners count as one where their
+    /// positions are equal. A mesh without any is closed: it has a volume, and dynamic bodies can carry it.
+    #[must_use]
+    pub fn open_edges(&self) -> usize {
+        self.open_edges
+    }
+
+    /// What is known of the inside of a closed mesh.
+    fn interior(&self) -> Option<&Interior> {
+        (self.open_edges == 0).then(|| self.interior.get_or_init(|| Interior::of(self)))
     }
 
     /// Which sides are solid.
@@ -189,15 +238,26 @@ impl TriangleMesh {
     /// from the front only. Of triangles met at the same distance the one with the smallest number is reported.
     #[must_use]
     pub fn cast_ray(&self, origin: Vec3, direction: Vec3, limit: Real) -> Option<MeshRayHit> {
-        let ray = Ray::new(origin, direction, &self.tree.around())?;
-        let slabs = Slabs::of_point(origin, direction);
-        let mut search = RaySearch { mesh: self, ray, slabs, best: None };
-        self.tree.descend(limit, &mut search);
-        search.best.map(|(distance, index, back)| {
+        self.first_hit(origin, direction, limit, self.sides).map(|(distance, index, back)| {
             let normal = self.facet(index).normal();
             let normal = if back { -normal } else { normal };
             MeshRayHit { distance, normal, triangle: self.surroundings[index].id }
         })
+    }
+
+    /// How far away a ray meets which triangle (its internal number), and whether from behind.
+    pub(super) fn first_hit(
+        &self,
+        origin: Vec3,
+        direction: Vec3,
+        limit: Real,
+        sides: MeshSides,
+    ) -> Option<(Real, usize, bool)> {
+        let ray = Ray::new(origin, direction, &self.tree.around())?;
+        let slabs = Slabs::of_point(origin, direction);
+        let mut search = RaySearch { mesh: self, ray, slabs, sides, best: None };
+        self.tree.descend(limit, &mut search);
+        search.best
     }
 
     /// Shows the triangles to a search that wants the nearest first.
@@ -243,8 +303,7 @@ impl TriangleMesh {
     #[inline(always)]
     pub(crate) fn facet(&self, index: usize) -> Facet {
         let corners = self.corners(index);
-        let cross = cross_of(&corners);
-        Facet::new(corners, (cross * (1.0 / cross.length())).as_vec3())
+        Facet::new(corners, unit_normal(&corners))
     }
 
     /// The triangles of a leaf side by side; lanes past the last hold that one again.
@@ -295,6 +354,11 @@ impl TriangleMesh {
         &self.surroundings[index]
     }
 
+    #[inline(always)]
+    pub(crate) fn material(&self, index: usize) -> u8 {
+        if self.materials.is_empty() { 0 } else { self.materials[self.surroundings[index].id as usize] }
+    }
+
     /// Calls `visit` with the far ends of all edges that meet in a corner, some of them twice, until it returns false.
     pub(crate) fn each_end(&self, corner: Vec3, visit: impl FnMut(Vec3) -> bool) {
         self.tree.walk(&Aabb::new(corner, corner), &mut Ends { mesh: self, corner, visit, goes_on: true });
@@ -328,12 +392,15 @@ impl Geometry for TriangleMesh {
         self.local_aabb()
     }
 
-    fn mass_properties(&self, _: Real) -> Result<MassProperties, ShapeError> {
-        Err(ShapeError::NoVolume { shape: "a mesh", advice: "put it on a static or kinematic body" })
+    fn mass_properties(&self, density: Real) -> Result<MassProperties, ShapeError> {
+        let interior = self.interior().ok_or(ShapeError::OpenMesh { edges: self.open_edges })?;
+        let advice = "turn its triangles around: seen from outside they have to wind counter-clockwise";
+        let unit = interior.unit.ok_or(ShapeError::NoVolume { shape: "the mesh", advice })?;
+        Ok(unit.scaled(density))
     }
 
     fn inner_ball(&self) -> (Vec3, Real) {
-        (self.local_aabb().center(), 0.0)
+        self.interior().map_or((self.local_aabb().center(), 0.0), |interior| interior.ball)
     }
 
     fn cast_ray(&self, ray: &query::Ray) -> Option<ShapeHit> {
@@ -364,6 +431,13 @@ fn cross_of([a, b, c]: &[Vec3; 3]) -> DVec3 {
     (b.as_dvec3() - a).cross(c.as_dvec3() - a)
 }
 
+/// Unit normal of a triangle that has an area.
+#[inline(always)]
+pub(super) fn unit_normal(corners: &[Vec3; 3]) -> Vec3 {
+    let cross = cross_of(corners);
+    (cross * (1.0 / cross.length())).as_vec3()
+}
+
 /// Unit normal; `None` where the height over the longest edge is below a millionth of that edge, so that rounding would
 /// decide which way the triangle faces.
 #[inline(always)]
@@ -378,7 +452,7 @@ fn normal_of([a, b, c]: [Vec3; 3]) -> Option<Vec3> {
 }
 
 /// A ray in the frame of the watertight test: sheared so that it runs along its longest axis.
-struct Ray {
+pub(super) struct Ray {
     origin: Vec3,
     axes: [usize; 3],
     shear: [f64; 3],
@@ -388,7 +462,7 @@ struct Ray {
 
 impl Ray {
     /// A ray for triangles in the box `around`.
-    fn new(origin: Vec3, direction: Vec3, around: &Aabb) -> Option<Self> {
+    pub(super) fn new(origin: Vec3, direction: Vec3, around: &Aabb) -> Option<Self> {
         let size = crate::math::abs3(direction);
         let z = if size.x >= size.y && size.x >= size.z { 0 } else { 1 + usize::from(size.z > size.y) };
         if !(size[z] > 0.0 && direction.is_finite() && origin.is_finite()) {
@@ -435,7 +509,7 @@ impl Ray {
     }
 
     /// How far along the ray a triangle is met, and whether from behind.
-    fn hit(&self, corners: &[Vec3; 3], sides: MeshSides) -> Option<(Real, bool)> {
+    pub(super) fn hit(&self, corners: &[Vec3; 3], sides: MeshSides) -> Option<(Real, bool)> {
         let origin = self.origin.as_dvec3();
         let [x, y, z] = self.axes;
         let sheared = corners.map(|corner| {
@@ -465,6 +539,7 @@ struct RaySearch<'a> {
     mesh: &'a TriangleMesh,
     ray: Ray,
     slabs: Slabs,
+    sides: MeshSides,
     /// Distance, internal number, whether hit from behind.
     best: Option<(Real, usize, bool)>,
 }
@@ -478,12 +553,12 @@ impl Descent for RaySearch<'_> {
     #[inline(always)]
     fn leaf<W: Lanes<LEAF>>(&mut self, first: usize, count: usize, limit: Real) -> Real {
         let corners = self.mesh.corners_of_leaf::<W>(first, count);
-        let mut bits = self.ray.may_hit(&corners, self.mesh.sides) & ((1 << count) - 1);
+        let mut bits = self.ray.may_hit(&corners, self.sides) & ((1 << count) - 1);
         let mut limit = limit;
         while bits != 0 {
             let index = first + bits.trailing_zeros() as usize % LEAF;
             bits &= bits - 1;
-            let Some((distance, back)) = self.ray.hit(&self.mesh.corners(index), self.mesh.sides) else { continue };
+            let Some((distance, back)) = self.ray.hit(&self.mesh.corners(index), self.sides) else { continue };
             let first = match self.best {
                 Some((best, other, _)) => (distance, self.mesh.id(index)) < (best, self.mesh.id(other)),
                 None => true,

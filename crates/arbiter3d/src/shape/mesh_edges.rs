@@ -43,7 +43,7 @@ const SEAM_GAP: Real = 1e-4;
 pub(crate) struct Bend(i16);
 
 impl Bend {
-    const BOUNDARY: Self = Self(i16::MIN);
+    pub(super) const BOUNDARY: Self = Self(i16::MIN);
     /// Steps up to a right angle.
     const QUARTER: Real = 16000.0;
     /// Steps that count as flat: [`FLAT_SINE`].
@@ -51,7 +51,7 @@ impl Bend {
 
     /// The bend from a triangle (unit normal, unit vector inwards from the edge) to a neighbour (unit vector away from the
     /// edge).
-    fn new(kind: EdgeKind, normal: Vec3, own: Vec3, neighbor: Vec3) -> Self {
+    pub(super) fn new(kind: EdgeKind, normal: Vec3, own: Vec3, neighbor: Vec3) -> Self {
         if kind == EdgeKind::Boundary {
             return Self::BOUNDARY;
         }
@@ -76,6 +76,11 @@ impl Bend {
             steps if steps < -Self::FLAT => EdgeKind::Convex,
             _ => EdgeKind::Flat,
         }
+    }
+
+    /// Whether no other triangle has the edge.
+    pub(crate) fn is_boundary(self) -> bool {
+        self == Self::BOUNDARY
     }
 
     /// Unit vector in the plane of the neighbour, at a right angle to the edge and away from it, for a triangle with that
@@ -105,6 +110,12 @@ pub(crate) struct Surroundings {
 }
 
 impl Surroundings {
+    /// As said at the fields.
+    #[inline(always)]
+    pub(super) fn from_parts(id: u32, patch: u32, bends: [Bend; 3], bits: u16) -> Self {
+        Self { id, patch, bends, bits }
+    }
+
     /// How the surface bends across edge `i` (from corner `i` to the next).
     pub(crate) fn bend(&self, i: usize) -> Bend {
         self.bends[i]
@@ -171,6 +182,8 @@ pub(super) struct Adjacency<'a> {
     patches: Vec<u32>,
     /// For each welded corner [`SHARP`] if a convex or open edge ends there, [`BENT`] if any edge that is not flat does.
     corners: Vec<u8>,
+    /// Sides that no side of the opposite direction matches.
+    open_edges: usize,
 }
 
 const SHARP: u8 = 1;
@@ -192,6 +205,7 @@ impl<'a> Adjacency<'a> {
             bends: vec![[Bend::BOUNDARY; 3]; surface.triangles.len()],
             patches: (0..surface.triangles.len() as u32).collect(),
             corners: vec![0; surface.vertices.len()],
+            open_edges: 0,
         };
         let (first, mut sides) = adjacency.sides();
         let mut inwards = Vec::new();
@@ -199,6 +213,7 @@ impl<'a> Adjacency<'a> {
             let at_corner = &mut sides[range[0] as usize..range[1] as usize];
             at_corner.sort_unstable();
             for group in at_corner.chunk_by(|a, b| a.end == b.end) {
+                adjacency.open_edges += adjacency.unmatched(group);
                 inwards.clear();
                 inwards.extend(group.iter().map(|side| surface.inward(side.triangle, side.edge)));
                 for (k, side) in group.iter().enumerate() {
@@ -208,6 +223,17 @@ impl<'a> Adjacency<'a> {
             }
         }
         adjacency
+    }
+
+    /// How many sides of an edge no side of the opposite direction matches. Zero for all edges of a closed mesh.
+    pub(super) fn open_edges(&self) -> usize {
+        self.open_edges
+    }
+
+    fn unmatched(&self, sides: &[Side]) -> usize {
+        let forward = |side: &&Side| self.welded_corner(side.triangle, side.edge as usize) != side.end;
+        let forward = sides.iter().filter(forward).count();
+        forward.abs_diff(sides.len() - forward)
     }
 
     fn welded_corner(&self, triangle: u32, i: usize) -> u32 {
@@ -256,13 +282,7 @@ impl<'a> Adjacency<'a> {
             }
         }
         let Some((closing, other, inward)) = closest else { return };
-        let kind = if closing > FLAT_SINE {
-            EdgeKind::Concave
-        } else if closing < -FLAT_SINE {
-            EdgeKind::Convex
-        } else {
-            EdgeKind::Flat
-        };
+        let kind = kind_of(closing);
         self.bends[side.triangle as usize][side.edge as usize] = Bend::new(kind, normal, own, inward);
         if kind == EdgeKind::Flat {
             self.join_patches(side.triangle, other);
@@ -351,6 +371,21 @@ impl<'a> Adjacency<'a> {
     fn join_patches(&mut self, a: u32, b: u32) {
         let (a, b) = (self.patch(a), self.patch(b));
         self.patches[a.max(b) as usize] = a.min(b);
+    }
+}
+
+/// The kind of the edge from a triangle (unit normal, unit vector inwards from the edge) to one neighbour.
+pub(super) fn kind_between(normal: Vec3, own: Vec3, neighbor: Vec3) -> EdgeKind {
+    kind_of(closing(neighbor, normal, own))
+}
+
+fn kind_of(closing: Real) -> EdgeKind {
+    if closing > FLAT_SINE {
+        EdgeKind::Concave
+    } else if closing < -FLAT_SINE {
+        EdgeKind::Convex
+    } else {
+        EdgeKind::Flat
     }
 }
 

@@ -7,7 +7,7 @@
 //! Convex kinds with kernels of their own: spheres, capsules, cuboids, hulls. Convex kinds known to the kernels by their
 //! support function and their features (`convex`): cylinders, cones, tapered capsules, single triangles, point clouds,
 //! anything convex grown by a radius or after an affine map, and shapes of the user's own. Then endless half-spaces, and
-//! what is made of many parts: triangle meshes.
+//! what is made of many parts: triangle meshes and height fields.
 
 mod capsule;
 mod cone;
@@ -17,6 +17,7 @@ mod custom;
 mod cylinder;
 mod geometry;
 mod half_space;
+mod height_field;
 mod hull;
 mod hull_builder;
 mod hull_core;
@@ -25,11 +26,13 @@ mod hull_merge;
 mod mass;
 mod mesh;
 mod mesh_edges;
+mod mesh_interior;
 mod mesh_tree;
 mod mesh_tree_builder;
 mod point_cloud;
 mod rounded;
 mod sphere;
+mod surface;
 mod tapered_capsule;
 mod transformed;
 mod triangle;
@@ -42,16 +45,19 @@ pub use custom::{ConvexShape, Custom};
 pub use cylinder::Cylinder;
 pub(crate) use geometry::Geometry;
 pub use half_space::HalfSpace;
+pub use height_field::{FieldDiagonals, FieldSide, HeightField};
 pub use hull::{ConvexHull, HalfEdge, Plane};
 pub(crate) use hull_features::{BorderEdge, CornerGroup, FaceGroup, LANES};
 pub use mass::MassProperties;
 pub(crate) use mesh::Facet;
 pub use mesh::{MeshRayHit, MeshSides, TriangleMesh};
 pub(crate) use mesh_edges::Surroundings;
+pub(crate) use mesh_interior::distance_squared;
 pub(crate) use mesh_tree::{Descent, LEAF, Leaves, Slabs, box_distances};
 pub use point_cloud::PointCloud;
 pub use rounded::Rounded;
 pub use sphere::Sphere;
+pub(crate) use surface::Surface;
 pub use tapered_capsule::TaperedCapsule;
 pub use transformed::Transformed;
 pub use triangle::Triangle;
@@ -130,6 +136,27 @@ pub enum ShapeError {
         /// Which triangle.
         triangle: usize,
     },
+    /// Heights that are no grid.
+    #[error(
+        "{heights} heights in rows of {points_per_row}: a height field needs full rows, at least 2 × 2 heights, at most \
+         2^30 cells"
+    )]
+    FieldSize {
+        /// Heights given.
+        heights: usize,
+        /// Heights in a row.
+        points_per_row: usize,
+    },
+    /// A list that tells of each cell or triangle has another length.
+    #[error("{given} {what} were given, but there are {expected} cells or triangles: give one for each")]
+    WrongCount {
+        /// What was given.
+        what: &'static str,
+        /// How many.
+        given: usize,
+        /// How many there must be.
+        expected: usize,
+    },
     /// One ball of a tapered capsule holds the other.
     #[error(
         "balls of {top_radius} m and {bottom_radius} m are {distance} m apart, so one holds the other: use a sphere, or \
@@ -164,7 +191,9 @@ pub enum ShapeError {
         advice: &'static str,
     },
     /// A mesh with holes has no inside, so no mass.
-    #[error("{edges} edges of the mesh have no matching neighbour: close the mesh, or put it on a static body")]
+    #[error(
+        "{edges} edges of the mesh have no matching neighbour: close it, give the shape density 0, or use a static body"
+    )]
     OpenMesh {
         /// How many edges are open, or run the same way in two triangles.
         edges: usize,
@@ -237,6 +266,8 @@ pub enum Shape {
     Rounded(Arc<Rounded>),
     /// A convex shape after an affine map.
     Transformed(Arc<Transformed>),
+    /// Ground by a grid of heights, for static and kinematic bodies.
+    HeightField(Arc<HeightField>),
     /// A convex shape of the user's own.
     Custom(Arc<Custom>),
 }
@@ -280,6 +311,15 @@ impl Shape {
     /// If there is no triangle, an index is out of range, a vertex is not finite or a triangle has no area.
     pub fn mesh(vertices: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Result<Self, ShapeError> {
         TriangleMesh::new(vertices, triangles).map(|mesh| Self::Mesh(Arc::new(mesh)))
+    }
+
+    /// Ground by a grid of heights, metres, row by row (along z), `points_per_row` along x; cells measure `cell` metres along x
+    /// and z. The first corner is at the origin. See [`HeightField`] for holes, materials and diagonals.
+    ///
+    /// # Errors
+    /// If there are fewer than 2 × 2 heights, the rows are not all full, a height is not finite, or a cell has no size.
+    pub fn height_field(heights: Vec<Real>, points_per_row: usize, cell: [Real; 2]) -> Result<Self, ShapeError> {
+        HeightField::new(heights, points_per_row, cell).map(|field| Self::HeightField(Arc::new(field)))
     }
 
     /// A cylinder along y, from `-half_length` to `half_length`; metres.
@@ -368,6 +408,7 @@ impl Shape {
                 let turn = |[a, b, c]: [u32; 3]| if mirrored { [a, c, b] } else { [a, b, c] };
                 let triangles = s.triangles().iter().map(|&t| turn(t)).collect();
                 let mesh = TriangleMesh::with_sides(all(s.vertices()), triangles, s.sides())?;
+                let mesh = if s.materials().is_empty() { mesh } else { mesh.with_materials(s.materials().to_vec())? };
                 Ok(Self::Mesh(Arc::new(mesh)))
             }
             _ => Transformed::new(self, linear, translation).map(|shape| Self::Transformed(Arc::new(shape))),
@@ -413,6 +454,7 @@ impl Shape {
             Self::PointCloud(s) => &**s,
             Self::Rounded(s) => &**s,
             Self::Transformed(s) => &**s,
+            Self::HeightField(s) => &**s,
             Self::Custom(s) => &**s,
         }
     }
@@ -477,7 +519,7 @@ impl Shape {
 
     /// Corners and triangles of the surface, for drawing and exporting; the triangles wind counter-clockwise from outside.
     ///
-    /// Cuboids, hulls and meshes as they are; other convex shapes through about `4 steps²` points of their surface, at least
+    /// Cuboids, hulls, meshes and height fields as they are; other convex shapes through about `4 steps²` points of their surface, at least
     /// one step, at most 64. A half-space gives a square of 200 m.
     ///
     /// ```
@@ -503,6 +545,7 @@ impl Shape {
             }
             Self::Hull(s) => fan(s),
             Self::Mesh(s) => (s.vertices().to_vec(), s.triangles().to_vec()),
+            Self::HeightField(s) => s.triangles(),
             Self::Triangle(s) => (s.corners().to_vec(), vec![[0, 1, 2], [0, 2, 1]]),
             Self::HalfSpace(_) => {
                 let corners = [(-1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (1.0, -1.0)];
@@ -510,6 +553,15 @@ impl Shape {
             }
             other => Support::new(other)
                 .map_or_else(Default::default, |support| convex::surface_of_support(&support, steps.clamp(1, 64))),
+        }
+    }
+
+    /// Which material of the palette a triangle of a mesh or a height field has, by the number that the user knows it by.
+    pub(crate) fn triangle_material(&self, triangle: u32) -> u8 {
+        match self {
+            Self::Mesh(mesh) => mesh.materials().get(triangle as usize).copied().unwrap_or(0),
+            Self::HeightField(field) => field.material(triangle as usize),
+            _ => 0,
         }
     }
 

@@ -294,7 +294,7 @@ pub(crate) fn fresh_data() -> ContactData {
 /// Material of an engine arbiter, from its two shapes; what users have set stays.
 pub(crate) fn mix_shape_materials(pair: &mut Pair, data: &mut ContactData, shapes: &[ShapeSlot], bodies: &[Body]) {
     let [a, b] = pair.shapes.map(|slot| &shapes[slot as usize]);
-    let (ma, mb) = (&a.material, &b.material);
+    let (ma, mb) = (a.surface(pair.materials[0]), b.surface(pair.materials[1]));
     let friction = ma.friction_combine.max(mb.friction_combine).combine(ma.friction, mb.friction);
     let restitution = ma.restitution_combine.max(mb.restitution_combine).combine(ma.restitution, mb.restitution);
     let rolling = max(ma.rolling_resistance, mb.rolling_resistance)
@@ -320,23 +320,28 @@ pub(crate) fn mix_shape_materials(pair: &mut Pair, data: &mut ContactData, shape
         data.rolling_resistance = rolling;
     }
     if pair.conveyor || data.flags & ANISOTROPIC != 0 {
-        turn_anisotropy([a, b], pair.bodies.map(|body| bodies[body as usize].pose.rotation), data);
+        turn_anisotropy([a, b], [ma, mb], pair.bodies.map(|body| bodies[body as usize].pose.rotation), data);
     }
 }
 
 /// Direction and ratio of the anisotropic friction of an arbiter, if users have not set them: of the two materials that
 /// with the smaller ratio.
-pub(crate) fn turn_anisotropy(shapes: [&ShapeSlot; 2], rotations: [Rotation; 2], data: &mut ContactData) {
+pub(crate) fn turn_anisotropy(
+    shapes: [&ShapeSlot; 2],
+    materials: [&Material; 2],
+    rotations: [Rotation; 2],
+    data: &mut ContactData,
+) {
     if data.flags & ANISOTROPY_OVERRIDDEN != 0 {
         return;
     }
-    let side = match shapes.map(|shape| shape.material.anisotropy) {
+    let side = match materials.map(|material| material.anisotropy) {
         [Some(a), Some(b)] => Some(usize::from(b.ratio < a.ratio)),
         [Some(_), None] => Some(0),
         [None, Some(_)] => Some(1),
         [None, None] => None,
     };
-    let chosen = side.and_then(|side| Some((side, shapes[side].material.anisotropy?)));
+    let chosen = side.and_then(|side| Some((side, materials[side].anisotropy?)));
     data.put_anisotropy(chosen.map(|(side, anisotropy)| {
         let direction = rotations[side].rotate(shapes[side].pose.rotation.rotate(anisotropy.direction));
         (direction, anisotropy.ratio)

@@ -500,14 +500,14 @@ impl<'a> BodyMut<'a> {
     /// becomes static loses its velocity.
     ///
     /// # Errors
-    /// If it carries a mesh and would become dynamic, or is the world's own.
+    /// If it carries a shape without a volume (see [`World::add_shape`]) and would become dynamic, or is the world's own.
     pub fn set_kind(&mut self, kind: BodyKind) -> Result<(), Error> {
         self.movable()?;
         if kind == self.read().kind() {
             return Ok(());
         }
-        if kind == BodyKind::Dynamic && self.world.carries_mesh(self.id.index) {
-            return Err(Error::MeshNotDynamic);
+        if kind == BodyKind::Dynamic {
+            self.world.check_dynamic(self.id.index)?;
         }
         self.world.change_kind(self.id.index, kind);
         self.world.flush_events();

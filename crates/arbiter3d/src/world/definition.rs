@@ -427,6 +427,10 @@ pub struct ShapeDefinition {
     pub density: Real,
     /// The surface.
     pub material: Material,
+    /// Materials of the triangles of a mesh or the cells of a height field, by the numbers that these were given
+    /// ([`TriangleMesh::with_materials`](crate::TriangleMesh::with_materials)); `material` for numbers past the end. Where a
+    /// body touches several, that of the deepest contact counts. Default empty: all of it is of `material`.
+    pub palette: Vec<Material>,
     /// Which shapes it meets.
     pub filter: Filter,
     /// Whether it only reports what overlaps it and pushes nothing. Default false.
@@ -450,6 +454,7 @@ impl ShapeDefinition {
             rotation: Quat::IDENTITY,
             density: 1000.0,
             material: Material::default(),
+            palette: Vec::new(),
             filter: Filter::default(),
             sensor: false,
             events: ContactEvents::NONE,
@@ -503,6 +508,12 @@ impl ShapeDefinition {
         Self { filter, ..self }
     }
 
+    /// The same with materials for the numbers of its triangles or cells.
+    #[must_use]
+    pub fn palette(self, palette: Vec<Material>) -> Self {
+        Self { palette, ..self }
+    }
+
     /// The same as a sensor.
     #[must_use]
     pub fn sensor(self) -> Self {
@@ -543,6 +554,7 @@ impl ShapeDefinition {
         unit_rotation("shape rotation", self.rotation)?;
         in_range("density", self.density, 0.0, 1e12)?;
         self.one_way.map_or(Ok(()), |way| unit_vec("one_way", way).map(|_| ()))?;
+        self.palette.iter().try_for_each(Material::validate)?;
         self.material.validate()
     }
 }

@@ -55,6 +55,8 @@ pub(crate) struct Pair {
     /// How far a pair with contacts may move until then, metres.
     touch_distance: Real,
     pub cache: PairCache,
+    /// Which materials of their palettes the two shapes touch with.
+    pub materials: [u8; 2],
 }
 
 /// Traits that are those of [`super::definition::ContactEvents`].
@@ -208,8 +210,8 @@ impl PairRules<'_> {
         let dynamic = kind_a == BodyKind::Dynamic || kind_b == BodyKind::Dynamic;
         match (shape_a.sensor, shape_b.sensor) {
             (true, true) => false,
-            (false, false) => dynamic && (shape_a.geometry.is_convex() || shape_b.geometry.is_convex()),
-            _ => shape_a.geometry.is_convex() || shape_b.geometry.is_convex(),
+            (false, false) => dynamic,
+            _ => true,
         }
     }
 }
@@ -250,6 +252,7 @@ impl PairMaker<'_> {
             touch_distance: size * if cuboids { REUSE_CUBOIDS } else { REUSE_TRANSLATION },
             apart_rotation: self.speculative_distance / (8.0 * min(slots[0].reach, slots[1].reach)),
             cache: PairCache::default(),
+            materials: [0; 2],
         }
     }
 

@@ -10,6 +10,7 @@ use crate::math::{Aabb, Pose, Quat, Real, Vec3};
 use crate::place_table::mix;
 use crate::shape::Shape;
 use crate::storage;
+use std::sync::Arc;
 
 /// What the world keeps of a shape.
 #[derive(Clone, Debug)]
@@ -33,6 +34,8 @@ pub(crate) struct ShapeSlot {
     pub pose: Pose,
     pub density: Real,
     pub material: Material,
+    /// Materials of parts of the surface; empty where all of it is of one.
+    pub palette: Option<Arc<[Material]>>,
     pub filter: Filter,
     /// The way in which bodies pass through it, in its frame, of unit length.
     pub one_way: Option<Vec3>,
@@ -40,6 +43,18 @@ pub(crate) struct ShapeSlot {
 }
 
 impl ShapeSlot {
+    /// The material of a part of the surface.
+    pub fn surface(&self, index: u8) -> &Material {
+        self.palette.as_ref().and_then(|palette| palette.get(index as usize)).unwrap_or(&self.material)
+    }
+
+    /// Whether some part of the surface has a restitution.
+    #[inline(always)]
+    pub fn bounces(&self) -> bool {
+        let palette = self.palette.as_deref().unwrap_or_default();
+        self.material.restitution > 0.0 || palette.iter().any(|material| material.restitution > 0.0)
+    }
+
     /// Notes where the centre of mass of the body is.
     pub fn set_center(&mut self, center: Vec3) {
         self.from_center = Pose::new(self.pose.position - center, self.pose.rotation);
@@ -136,6 +151,12 @@ impl<'a> ShapeRef<'a> {
     #[must_use]
     pub fn material(&self) -> Material {
         self.slot.material
+    }
+
+    /// The materials of its triangles or cells; empty where all of it is of [`ShapeRef::material`].
+    #[must_use]
+    pub fn palette(&self) -> &'a [Material] {
+        self.slot.palette.as_deref().unwrap_or_default()
     }
 
     /// Which shapes it meets.
@@ -267,13 +288,14 @@ impl World {
     /// Attaches a shape to a body and returns its id. The body's mass follows unless it was given.
     ///
     /// # Errors
-    /// If the body is unknown, a number is out of its range, or a mesh would go on a dynamic body.
+    /// If the body is unknown, a number is out of its range, or a shape without a volume (an open mesh, a height field, a
+    /// half-space, a triangle) would go on a dynamic body, unless it is a sensor or its density is zero.
     pub fn add_shape(&mut self, body: BodyId, definition: &ShapeDefinition) -> Result<ShapeId, Error> {
         let index = self.body_index(body)?;
         definition.validate()?;
         let rotation = unit_rotation("shape rotation", definition.rotation)?;
-        if !definition.shape.is_convex() && self.bodies[index as usize].kind == BodyKind::Dynamic {
-            return Err(Error::MeshNotDynamic);
+        if self.bodies[index as usize].kind == BodyKind::Dynamic && !definition.sensor {
+            has_mass(&definition.shape, definition.density)?;
         }
         let id = ShapeId(self.next_id);
         self.next_id += 1;
@@ -288,6 +310,8 @@ impl World {
             geometry: definition.shape.clone(),
             density: definition.density,
             material: definition.material.normalized(),
+            palette: (!definition.palette.is_empty())
+                .then(|| definition.palette.iter().map(|m| m.normalized()).collect()),
             filter: definition.filter,
             sensor: definition.sensor,
             events: definition.events,
@@ -353,9 +377,10 @@ impl World {
         self.free_shapes.push(slot);
     }
 
-    pub(crate) fn carries_mesh(&self, body: u32) -> bool {
-        let slots = &self.bodies[body as usize].shape_slots;
-        slots.iter().any(|&slot| !self.shapes[slot as usize].geometry.is_convex())
+    /// Checks that all shapes of a body may be carried by a dynamic one.
+    pub(crate) fn check_dynamic(&self, body: u32) -> Result<(), Error> {
+        let shapes = self.bodies[body as usize].shape_slots.iter().map(|&slot| &self.shapes[slot as usize]);
+        shapes.filter(|shape| !shape.sensor).try_for_each(|shape| has_mass(&shape.geometry, shape.density))
     }
 
     /// Box of a shape now.
@@ -421,4 +446,12 @@ impl World {
         }
         self.wake(body);
     }
+}
+
+/// A shape that is to give a dynamic body a mass must have a volume.
+fn has_mass(shape: &Shape, density: Real) -> Result<(), Error> {
+    if density > 0.0 {
+        shape.mass_properties(density)?;
+    }
+    Ok(())
 }

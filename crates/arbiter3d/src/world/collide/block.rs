@@ -4,7 +4,7 @@
 //! many pairs at once; what a pass leaves for the next stands in small lists. Pairs of cuboids are gathered and collided `L`
 //! at a time.
 
-use super::super::arbiters::{surface_velocity, turn_anisotropy};
+use super::super::arbiters::{mix_shape_materials, surface_velocity, turn_anisotropy};
 use super::super::one_way::{self, Approach, Verdict};
 use super::super::pairs::{PRE_SOLVE, Pair, REUSE_ROTATION, WATCHED};
 use super::super::shapes::ShapeSlot;
@@ -346,8 +346,23 @@ impl<W: Lanes<L>, const L: usize> BlockKernel<'_, W, L> {
             }
             return;
         }
+        if pair.materials != manifold.materials() && !manifold.points().is_empty() {
+            self.change_materials(fresh.pair, manifold.materials());
+        }
+        let pair = self.pairs.shared(fresh.pair);
         let places = Places::of_manifold(&manifold, &PairFrame::new(pair, context.shapes, context.solver));
         self.settle(fresh, &places);
+    }
+
+    /// Other parts of the surfaces touch than before.
+    #[cold]
+    fn change_materials(&mut self, index: u32, materials: [u8; 2]) {
+        let context = self.context;
+        let (pair, arbiter) = self.pairs.pair_and_arbiter(index);
+        pair.materials = materials;
+        if let Some(arbiter) = arbiter {
+            mix_shape_materials(pair, &mut arbiter.data, context.shapes, context.bodies);
+        }
     }
 
     /// Gives a new manifold to the arbiter, or begins one.
@@ -385,11 +400,12 @@ pub(super) fn shapes_relative(between: &Pose, s1: &ShapeSlot, s2: &ShapeSlot) ->
 
 /// Surface velocities and directions of friction turn with their bodies.
 fn turn_conveyor(pair: &Pair, shapes: &[ShapeSlot], rotations: [Rotation; 2], data: &mut ContactData) {
+    let slots = pair.shapes.map(|slot| &shapes[slot as usize]);
+    let materials = [0, 1].map(|side| slots[side].surface(pair.materials[side]));
     if data.flags & TANGENT_VELOCITY_OVERRIDDEN == 0 {
-        let materials = pair.shapes.map(|slot| &shapes[slot as usize].material);
         data.tangent_velocity = surface_velocity(materials, rotations);
     }
-    turn_anisotropy(pair.shapes.map(|slot| &shapes[slot as usize]), rotations, data);
+    turn_anisotropy(slots, materials, rotations, data);
 }
 
 impl CollideContext<'_> {
@@ -431,7 +447,7 @@ impl CollideContext<'_> {
             return 0.0;
         }
         let fixed = pair.bodies.iter().any(|&body| self.solver.states[body as usize].is_fixed());
-        if fixed && pair.shapes.iter().all(|&slot| self.shapes[slot as usize].material.restitution == 0.0) {
+        if fixed && pair.shapes.iter().all(|&slot| !self.shapes[slot as usize].bounces()) {
             return self.settings.speculative_distance;
         }
         max(self.settings.speculative_distance, min(self.closing(pair), pair.size))

@@ -35,7 +35,7 @@ use crate::broad_phase::BroadPhase;
 use crate::math::{Aabb, Pose, Real, Vec3, min};
 use crate::narrow_phase::{Support, Sweep, gap, time_of_impact};
 use crate::parallel::SharedSlice;
-use crate::shape::{MeshSides, Shape, TriangleMesh};
+use crate::shape::{MeshSides, Shape, Surface};
 use crate::solver::SolverBodies;
 pub(crate) use bullets::FlightScratch;
 pub use impact::Impact;
@@ -314,13 +314,14 @@ impl ImpactSearch<'_> {
     /// First impact with a shape, in whose frame the mover is.
     fn impact_with(&self, geometry: &Shape, mover: &Mover<'_>) -> Option<Real> {
         match geometry {
-            Shape::Mesh(mesh) => self.mesh_impact(mesh, mover),
+            Shape::Mesh(mesh) => self.mesh_impact(Surface::Mesh(mesh), mover),
+            Shape::HeightField(field) => self.mesh_impact(Surface::Field(field), mover),
             convex => Support::new(convex).and_then(|fixed| self.impact(&fixed, mover)),
         }
     }
 
     /// First impact with a triangle of a mesh, coming from its solid side; all in the mesh's frame.
-    fn mesh_impact(&self, mesh: &TriangleMesh, mover: &Mover<'_>) -> Option<Real> {
+    fn mesh_impact(&self, mesh: Surface<'_>, mover: &Mover<'_>) -> Option<Real> {
         let near = 2.0 * self.settings.slop;
         let mut first = None;
         let swings = mover.swings();

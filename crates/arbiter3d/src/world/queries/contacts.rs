@@ -55,7 +55,7 @@ impl World {
                 let own = &self.shapes[slot as usize];
                 let manifold = placed_manifold((&own.geometry, &self.placed(slot)), (shape, &pose), margin);
                 if !manifold.points().is_empty() {
-                    let (body, material) = (self.body_id(own.body), own.material);
+                    let (body, material) = (self.body_id(own.body), *own.surface(manifold.materials()[0]));
                     found.push(ShapeContacts { body, shape: own.id, material, manifold });
                 }
             }

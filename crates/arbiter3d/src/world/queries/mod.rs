@@ -32,8 +32,10 @@ impl World {
     }
 
     /// What the surface of a shape is made of at a part of it.
-    fn material_at(&self, slot: u32, _child: Option<u32>, _triangle: Option<u32>) -> Material {
-        self.shapes[slot as usize].material
+    fn material_at(&self, slot: u32, _child: Option<u32>, triangle: Option<u32>) -> Material {
+        let shape = &self.shapes[slot as usize];
+        let number = triangle.map_or(0, |triangle| shape.geometry.triangle_material(triangle));
+        *shape.surface(number)
     }
 }
 
