@@ -43,10 +43,12 @@ mod world;
 
 pub use arbiter::{Arbiter, ArbiterId, ArbiterKey, Contact, ContactData, ContactPoint, EndReason, SolveMode};
 pub use query::{Ray, ShapeHit, cast_ray};
+#[cfg(feature = "decomposition")]
+pub use shape::DecompositionSettings;
 pub use shape::{
-    Capsule, Cone, ConvexHull, ConvexShape, Cuboid, Custom, Cylinder, HalfEdge, HalfSpace, MassProperties, MeshRayHit,
-    MeshSides, Plane, PointCloud, Rounded, Shape, ShapeError, Sphere, TaperedCapsule, Transformed, Triangle,
-    TriangleMesh,
+    Capsule, Compound, CompoundChild, Cone, ConvexHull, ConvexShape, Cuboid, Custom, Cylinder, HalfEdge, HalfSpace,
+    MassProperties, MeshRayHit, MeshSides, Plane, PointCloud, Rounded, Shape, ShapeError, Sphere, TaperedCapsule,
+    Transformed, Triangle, TriangleMesh, VoxelGrid,
 };
 pub use simd::{SimdLevel, UnknownSimdLevel};
 pub use world::{

@@ -1,4 +1,4 @@
-//! The same bits for any number of threads and any SIMD level: six scenes against checked-in hashes.
+//! The same bits for any number of threads and any SIMD level: seven scenes against checked-in hashes.
 //!
 //! The state hash is taken after each tenth step and folded into one number a scene. After a change that is meant to alter
 //! results, print the new table with
@@ -13,19 +13,20 @@ mod common;
 
 use arbiter3d::math::Vec3;
 use arbiter3d::{
-    ArbiterKey, BodyDefinition, BodyId, BodyKind, ContactPoint, ContactProvider, LockedAxes, Shape, ShapeDefinition,
-    SimdLevel, StepContext, World, WorldSettings,
+    ArbiterKey, BodyDefinition, BodyId, BodyKind, CompoundChild, ContactPoint, ContactProvider, LockedAxes, Shape,
+    ShapeDefinition, SimdLevel, StepContext, World, WorldSettings,
 };
 use common::*;
 
 /// The hashes of the scenes, in their order.
-const GOLDEN: [(&str, u64); 6] = [
+const GOLDEN: [(&str, u64); 7] = [
     ("pile", 0xaac7_fc32_c6dd_5cd4),
     ("hulls", 0x7d4f_1a72_0999_6ad2),
     ("mesh rain", 0xbbc5_9568_a34d_b749),
     ("bullets", 0x2095_d005_d124_c013),
     ("custom contacts", 0xf4d2_df3a_d912_e6b7),
-    ("coming and going", 0x8fe6_cf19_2475_ff5b),
+    ("coming and going", 0xcf0e_13f1_afab_f920),
+    ("compounds and voxels", 0x870a_f5df_fdbc_6ac8),
 ];
 
 /// A scene: how it begins, and what is done before each step.
@@ -36,13 +37,14 @@ struct Scene {
     before_step: fn(&mut World, usize),
 }
 
-const SCENES: [Scene; 6] = [
+const SCENES: [Scene; 7] = [
     Scene { name: "pile", steps: 180, build: pile, before_step: |_, _| {} },
     Scene { name: "hulls", steps: 150, build: hulls, before_step: |_, _| {} },
     Scene { name: "mesh rain", steps: 180, build: mesh_rain, before_step: |_, _| {} },
     Scene { name: "bullets", steps: 120, build: bullets, before_step: shoot },
     Scene { name: "custom contacts", steps: 180, build: custom_contacts, before_step: |_, _| {} },
     Scene { name: "coming and going", steps: 300, build: coming_and_going, before_step: come_and_go },
+    Scene { name: "compounds and voxels", steps: 150, build: compounds_and_voxels, before_step: |_, _| {} },
 ];
 
 /// Bodies of all shapes on a lattice over the origin, each turned and moving at random.
@@ -161,6 +163,37 @@ fn coming_and_going(world: &mut World) {
     scatter(world, 120, 0.0, &mut Random(46));
     let spinner = BodyDefinition::kinematic().at(Vec3::Y * 0.5).moving(Vec3::ZERO, Vec3::Y * 1.0);
     add(world, &spinner, &ShapeDefinition::new(cuboid(3.0, 0.2, 0.2)));
+}
+
+/// Compounds, voxel blocks and others fall on a pit of voxels beside a floor of separate boxes and one of a compound.
+fn compounds_and_voxels(world: &mut World) {
+    let pit = (0..256).flat_map(|at| [[at % 16, -1, at / 16], [0, at / 16, at % 16], [at / 16, at % 3, 0]]);
+    let pit = ShapeDefinition::new(Shape::voxels(0.5, pit).unwrap()).at(Vec3::new(-4.0, 0.0, -4.0));
+    world.add_shape(BodyId::WORLD, &pit).unwrap();
+    let tile = |at: i32| Vec3::new((at % 8) as f32 + 4.5, -0.5, (at / 8) as f32 - 3.5);
+    for at in 0..32 {
+        world.add_shape(BodyId::WORLD, &ShapeDefinition::new(cube(0.5)).at(tile(at))).unwrap();
+    }
+    let tiles: Vec<_> = (32..64).map(|at| CompoundChild::new(cube(0.5)).at(tile(at))).collect();
+    world.add_shape(BodyId::WORLD, &ShapeDefinition::new(Shape::compound(&tiles).unwrap())).unwrap();
+    let mut random = Random(47);
+    for at in 0..120 {
+        let shape = match at % 3 {
+            0 => {
+                let child = |k: usize| CompoundChild::new(random_shape(k)).at(Vec3::Y * (0.3 * k as f32 - 0.3));
+                Shape::compound(&[0, 1, 2].map(child)).unwrap()
+            }
+            1 => Shape::voxels(0.15, (0..12).map(|k| [k % 3, k / 3 % 2, k * at as i32 % 4])).unwrap(),
+            _ => random.shape(),
+        };
+        let place = Vec3::new((at % 12) as f32 - 2.0, (at / 48) as f32 * 1.5 + 1.5, (at / 12 % 4) as f32 * 1.5 - 2.5);
+        let body = BodyDefinition::dynamic().at(place + random.vector(0.1)).rotated(random.rotation());
+        add(world, &body.moving(random.vector(2.0), random.vector(3.0)), &ShapeDefinition::new(shape));
+    }
+}
+
+fn random_shape(kind: usize) -> Shape {
+    [sphere(0.2), cuboid(0.3, 0.1, 0.2), capsule(0.2, 0.1)][kind].clone()
 }
 
 /// Adds, removes, pushes, teleports and changes bodies; for the last part all is left alone, and sleeps in part.
@@ -288,10 +321,16 @@ fn golden_coming_and_going() {
     check(5);
 }
 
+/// Shapes made of parts, and floors of many shapes.
+#[test]
+fn golden_compounds_and_voxels() {
+    check(6);
+}
+
 /// The scenes do what they are for: they have contacts, sleepers and motion.
 #[test]
 fn the_scenes_are_worth_hashing() {
-    for (scene, contacts) in SCENES.iter().zip([500, 300, 400, 50, 150, 100]) {
+    for (scene, contacts) in SCENES.iter().zip([500, 300, 400, 50, 150, 100, 200]) {
         let mut world = World::new(settings(1, SimdLevel::best())).unwrap();
         let hashes = play(&mut world, scene);
         let found = world.contact_count();

@@ -162,6 +162,8 @@ pub(crate) const TANGENT_VELOCITY_OVERRIDDEN: u8 = 4;
 pub(crate) const ROLLING_OVERRIDDEN: u8 = 8;
 /// All contacts have the bit-equal normal and nothing removed: one row holds them all.
 pub(crate) const ONE_NORMAL: u8 = 16;
+/// All contacts are with inner edges or faces of what several shapes make together: they are not solved.
+pub(crate) const HIDDEN: u8 = 32;
 
 impl ContactData {
     quad_view! {

@@ -26,7 +26,8 @@ pub use solve_mode::SolveMode;
 pub use store::{Arbiter, ArbiterId, EndReason};
 
 pub(crate) use contact_data::{
-    FRICTION_OVERRIDDEN, ONE_NORMAL, RESTITUTION_OVERRIDDEN, ROLLING_OVERRIDDEN, SLOTS, TANGENT_VELOCITY_OVERRIDDEN,
+    FRICTION_OVERRIDDEN, HIDDEN, ONE_NORMAL, RESTITUTION_OVERRIDDEN, ROLLING_OVERRIDDEN, SLOTS,
+    TANGENT_VELOCITY_OVERRIDDEN,
 };
 pub(crate) use store::{ArbiterStore, Entry, IdMap, NONE, Name};
 

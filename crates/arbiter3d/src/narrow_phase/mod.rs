@@ -1,7 +1,7 @@
 //! Contacts between two shapes: which points touch, along which normal, how deep.
 //!
 //! [`collide`] sorts a pair by the kind of its shapes, so that each kernel is written once, with the more complex
-//! shape in the role of shape 1: mesh, hull, cuboid, capsule, sphere. Where the caller's order is the other one, the
+//! shape in the role of shape 1: compound, voxels, mesh, hull, cuboid, capsule, sphere. Where the caller's order is the other one, the
 //! result is mirrored.
 //!
 //! Every kernel keeps these laws:
@@ -15,6 +15,7 @@
 
 mod capsule;
 mod clip;
+mod composite;
 mod cuboid;
 mod distance;
 mod general;
@@ -25,6 +26,7 @@ mod mesh;
 mod mesh_points;
 mod penetration;
 mod polyhedron;
+mod seam;
 mod sphere;
 mod support;
 mod time_of_impact;
@@ -34,6 +36,7 @@ mod triangle_solid;
 
 pub(crate) use cuboid::{CuboidLanes, CuboidPair, Near as NearCuboids, WideManifold};
 pub(crate) use distance::closest;
+pub(crate) use seam::{Cast, Patch, scale_of};
 pub(crate) use support::Support;
 pub(crate) use time_of_impact::{Sweep, gap, time_of_impact};
 
@@ -60,7 +63,7 @@ pub struct PairCache {
 /// Finds the contacts of two shapes that are closer than `margin` (metres, zero or more).
 ///
 /// `pose` places shape 2 in the frame of shape 1; the manifold is in that frame, its normals point from shape 1 to
-/// shape 2. Two meshes never touch.
+/// shape 2. Two meshes never touch, nor do a mesh and a half-space.
 ///
 /// ```
 /// use arbiter3d::{Shape, math::{Pose, Vec3}, narrow_phase::{Manifold, PairCache, collide}};
@@ -110,8 +113,16 @@ fn rank(shape: &Shape) -> u8 {
         Shape::Hull(_) => 3,
         Shape::HalfSpace(_) => 6,
         Shape::Mesh(_) => 5,
+        Shape::Voxels(_) => 7,
+        Shape::Compound(_) => 8,
         _ => 4,
     }
+}
+
+/// Whether [`collide`] knows the contacts of two shapes.
+pub(crate) fn can_collide(shape1: &Shape, shape2: &Shape) -> bool {
+    let whole = |shape: &Shape| matches!(shape, Shape::Mesh(_) | Shape::HalfSpace(_));
+    !(whole(shape1) && whole(shape2))
 }
 
 #[inline(always)]
@@ -134,6 +145,8 @@ fn collide_sorted(
         (Shape::Hull(a), Shape::Cuboid(b)) => hull::collide(level, (a, b), pose, margin, (cache, manifold)),
         (Shape::Hull(a), Shape::Hull(b)) => hull::collide(level, (a, &**b), pose, margin, (cache, manifold)),
         (Shape::Mesh(a), convex) if convex.is_convex() => mesh::collide(a, convex, pose, margin, manifold),
+        (Shape::Compound(a), other) => composite::collide(level, (&**a, other), pose, margin, manifold),
+        (Shape::Voxels(a), other) => composite::collide(level, (&**a, other), pose, margin, manifold),
         (Shape::HalfSpace(_), other) => half_space::collide(other, pose, margin, manifold),
         _ => general::collide((shape1, shape2), pose, margin, manifold),
     }

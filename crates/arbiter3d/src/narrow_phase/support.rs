@@ -42,7 +42,7 @@ impl<'a> Support<'a> {
             Shape::Rounded(s) => Self::Rounded(s),
             Shape::Transformed(s) => Self::Transformed(s),
             Shape::Custom(s) => Self::Custom(s),
-            Shape::Mesh(_) | Shape::HalfSpace(_) => return None,
+            Shape::Mesh(_) | Shape::HalfSpace(_) | Shape::Compound(_) | Shape::Voxels(_) => return None,
         })
     }
 

@@ -55,11 +55,18 @@ impl MassProperties {
 
 /// Second moments `∫ x xᵀ` of a solid with its volume and its first moments, in `f64`: they add up over parts, and an affine
 /// map turns them exactly.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Moments {
     pub volume: f64,
     pub first: DVec3,
     pub second: DMat3,
+}
+
+impl Default for Moments {
+    /// Nothing. The default matrix is the identity, so this is not derived.
+    fn default() -> Self {
+        Self { volume: 0.0, first: DVec3::ZERO, second: DMat3::ZERO }
+    }
 }
 
 impl Moments {

@@ -118,13 +118,33 @@ impl ImpactSearch<'_> {
             if body.kind == BodyKind::Static && !other.sensor && mover.shape.filter.accepts(&other.filter) {
                 let pose = body.pose.mul(&other.pose);
                 let mover = mover.relative_to(&pose);
-                let impact = match &other.geometry {
-                    Shape::Mesh(mesh) => self.mesh_impact(mesh, &mover, near),
-                    convex => Support::new(convex).and_then(|fixed| self.impact(&fixed, &mover)),
-                };
-                first = min(impact.unwrap_or(limit), first);
+                first = min(self.impact_with(&other.geometry, &mover, near).unwrap_or(limit), first);
             }
         });
+        first
+    }
+
+    /// First impact with a shape at the origin.
+    fn impact_with(&self, fixed: &Shape, mover: &Mover<'_>, near: Real) -> Option<Real> {
+        let mut first = None;
+        let mut note = |impact: Option<Real>| {
+            if let Some(t) = impact
+                && first.is_none_or(|earliest| t < earliest)
+            {
+                first = Some(t);
+            }
+        };
+        match fixed {
+            Shape::Mesh(mesh) => return self.mesh_impact(mesh, mover, near),
+            Shape::Compound(compound) => compound.for_each_child(&mover.core_box(near), |_, child, pose| {
+                note(self.impact_with(child, &mover.relative_to(pose), near));
+            }),
+            Shape::Voxels(grid) => grid.for_each_box(&mover.core_box(near), |_, cuboid, center| {
+                let mover = mover.relative_to(&Pose::from_position(center));
+                note(self.impact(&Support::Cuboid(cuboid), &mover));
+            }),
+            convex => return Support::new(convex).and_then(|fixed| self.impact(&fixed, mover)),
+        }
         first
     }
 
@@ -228,7 +248,22 @@ impl<'a> Mover<'a> {
         let path = Sweep { start: way.start.mul(on_body), end: way.end.mul(on_body), pivot: center };
         let to_middle = Pose::from_position(center);
         let core_path = Sweep { start: path.start.mul(&to_middle), end: path.end.mul(&to_middle), pivot: Vec3::ZERO };
-        Some(Self { shape, support: Support::new(&shape.geometry)?, path, thickness, core, core_path })
+        let support = match &shape.geometry {
+            // Of what is made of parts, the ball in the thickest of them.
+            Shape::Compound(_) | Shape::Voxels(_) => {
+                let ball = Sphere::new(2.0 * thickness).ok()?;
+                return Some(Self {
+                    shape,
+                    support: Support::Sphere(ball),
+                    path: core_path,
+                    thickness,
+                    core,
+                    core_path,
+                });
+            }
+            other => Support::new(other)?,
+        };
+        Some(Self { shape, support, path, thickness, core, core_path })
     }
 
     /// A small ball in the middle of the core.

@@ -13,7 +13,7 @@ use super::definition::BodyKind;
 use super::shapes::ShapeSlot;
 use crate::arbiter::{EndReason, NONE};
 use crate::math::{Pose, Real, Rotation, Vec3, max, min};
-use crate::narrow_phase::PairCache;
+use crate::narrow_phase::{PairCache, can_collide};
 use crate::parallel::SharedSlice;
 use crate::shape::Shape;
 use crate::simd::{prefetch, quad_view};
@@ -187,7 +187,7 @@ impl PairRules<'_> {
         let dynamic = kind_a == BodyKind::Dynamic || kind_b == BodyKind::Dynamic;
         match (shape_a.sensor, shape_b.sensor) {
             (true, true) => false,
-            (false, false) => dynamic && (shape_a.geometry.is_convex() || shape_b.geometry.is_convex()),
+            (false, false) => dynamic && can_collide(&shape_a.geometry, &shape_b.geometry),
             _ => kind_a != BodyKind::Static || kind_b != BodyKind::Static,
         }
     }

@@ -216,6 +216,14 @@ impl<'a> ShapeMut<'a> {
     }
 }
 
+/// Whether a shape may be on a dynamic body: it is convex, or made of what has a mass.
+fn can_be_dynamic(shape: &Shape) -> bool {
+    match shape {
+        Shape::Compound(_) | Shape::Voxels(_) => shape.mass_properties(1.0).is_ok(),
+        other => other.is_convex(),
+    }
+}
+
 impl World {
     pub(crate) fn shape_slot(&self, id: ShapeId) -> Result<u32, Error> {
         let found = self.shape_slots.find(mix(0, id.0), |slot| self.shapes[slot as usize].id == id);
@@ -230,7 +238,7 @@ impl World {
         let index = self.body_index(body)?;
         definition.validate()?;
         let rotation = unit_rotation("shape rotation", definition.rotation)?;
-        if !definition.shape.is_convex() && self.bodies[index as usize].kind == BodyKind::Dynamic {
+        if !can_be_dynamic(&definition.shape) && self.bodies[index as usize].kind == BodyKind::Dynamic {
             return Err(Error::MeshNotDynamic);
         }
         let id = ShapeId(self.next_id);
@@ -309,7 +317,7 @@ impl World {
 
     pub(crate) fn carries_mesh(&self, body: u32) -> bool {
         let slots = &self.bodies[body as usize].shape_slots;
-        slots.iter().any(|&slot| !self.shapes[slot as usize].geometry.is_convex())
+        slots.iter().any(|&slot| !can_be_dynamic(&self.shapes[slot as usize].geometry))
     }
 
     /// Box of a shape now.
