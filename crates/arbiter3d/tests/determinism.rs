@@ -1,4 +1,4 @@
-//! The same bits for any number of threads and any SIMD level: seven scenes against checked-in hashes.
+//! The same bits for any number of threads and any SIMD level: nine scenes against checked-in hashes.
 //!
 //! The state hash is taken after each tenth step and folded into one number a scene. After a change that is meant to alter
 //! results, print the new table with
@@ -13,20 +13,22 @@ mod common;
 
 use arbiter3d::math::Vec3;
 use arbiter3d::{
-    ArbiterKey, BodyDefinition, BodyId, BodyKind, CompoundChild, ContactPoint, ContactProvider, LockedAxes, Shape,
-    ShapeDefinition, SimdLevel, StepContext, World, WorldSettings,
+    ArbiterKey, BodyDefinition, BodyId, BodyKind, CompoundChild, ContactEvents, ContactPoint, ContactProvider,
+    LockedAxes, Shape, ShapeDefinition, SimdLevel, StepContext, World, WorldSettings,
 };
 use common::*;
 
 /// The hashes of the scenes, in their order.
-const GOLDEN: [(&str, u64); 7] = [
+const GOLDEN: [(&str, u64); 9] = [
     ("pile", 0xaac7_fc32_c6dd_5cd4),
     ("hulls", 0x7d4f_1a72_0999_6ad2),
-    ("mesh rain", 0xbbc5_9568_a34d_b749),
-    ("bullets", 0x2095_d005_d124_c013),
+    ("mesh rain", 0x5dbb_e991_fd15_42a9),
+    ("bullets", 0x75d1_ec1d_6776_8a2b),
     ("custom contacts", 0xf4d2_df3a_d912_e6b7),
-    ("coming and going", 0xcf0e_13f1_afab_f920),
-    ("compounds and voxels", 0x870a_f5df_fdbc_6ac8),
+    ("coming and going", 0x8701_bac0_274c_2094),
+    ("surfaces", 0x3d59_6268_6154_9bc5),
+    ("rods and bullets", 0x945b_21b6_158d_4406),
+    ("compounds and voxels", 0xc6bf_573a_b3da_da05),
 ];
 
 /// A scene: how it begins, and what is done before each step.
@@ -37,13 +39,15 @@ struct Scene {
     before_step: fn(&mut World, usize),
 }
 
-const SCENES: [Scene; 7] = [
+const SCENES: [Scene; 9] = [
     Scene { name: "pile", steps: 180, build: pile, before_step: |_, _| {} },
     Scene { name: "hulls", steps: 150, build: hulls, before_step: |_, _| {} },
     Scene { name: "mesh rain", steps: 180, build: mesh_rain, before_step: |_, _| {} },
     Scene { name: "bullets", steps: 120, build: bullets, before_step: shoot },
     Scene { name: "custom contacts", steps: 180, build: custom_contacts, before_step: |_, _| {} },
     Scene { name: "coming and going", steps: 300, build: coming_and_going, before_step: come_and_go },
+    Scene { name: "surfaces", steps: 180, build: surfaces, before_step: ask_for_surfaces },
+    Scene { name: "rods and bullets", steps: 120, build: rods_and_bullets, before_step: |_, _| {} },
     Scene { name: "compounds and voxels", steps: 150, build: compounds_and_voxels, before_step: |_, _| {} },
 ];
 
@@ -183,7 +187,7 @@ fn compounds_and_voxels(world: &mut World) {
                 let child = |k: usize| CompoundChild::new(random_shape(k)).at(Vec3::Y * (0.3 * k as f32 - 0.3));
                 Shape::compound(&[0, 1, 2].map(child)).unwrap()
             }
-            1 => Shape::voxels(0.15, (0..12).map(|k| [k % 3, k / 3 % 2, k * at as i32 % 4])).unwrap(),
+            1 => Shape::voxels(0.15, (0..12).map(|k| [k % 3, k / 3 % 2, k * at % 4])).unwrap(),
             _ => random.shape(),
         };
         let place = Vec3::new((at % 12) as f32 - 2.0, (at / 48) as f32 * 1.5 + 1.5, (at / 12 % 4) as f32 * 1.5 - 2.5);
@@ -219,6 +223,72 @@ fn come_and_go(world: &mut World, step: usize) {
         ..body
     };
     add(world, &body, &ShapeDefinition::new(random.shape()));
+}
+
+/// Spinning rods, bullets of all shapes, resting crates and a door that swings, in a room with thin elastic walls.
+fn rods_and_bullets(world: &mut World) {
+    for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
+        for side in [-1.0, 1.0] {
+            let wall = Shape::cuboid(Vec3::splat(6.0) - axis * 5.99).unwrap();
+            let wall = ShapeDefinition::new(wall).at(axis * side * 6.0 + Vec3::Y * 6.0);
+            world.add_shape(BodyId::WORLD, &wall.restitution(0.9)).unwrap();
+        }
+    }
+    let door = BodyDefinition::kinematic().at(Vec3::Y * 3.0).moving(Vec3::ZERO, Vec3::Y * 4.0);
+    add(world, &door, &ShapeDefinition::new(cuboid(2.0, 2.0, 0.02)));
+    let mut random = Random(47);
+    let rods = [capsule(0.6, 0.01), cuboid(0.01, 0.6, 0.01), Shape::hull(&bar(0.6)).unwrap()];
+    for at in 0..60 {
+        let body = BodyDefinition::dynamic().at(Vec3::Y * 6.0 + random.vector(4.5)).rotated(random.rotation());
+        let (speed, spin) = [(10.0, 60.0), (150.0, 20.0), (0.0, 0.0)][at % 3];
+        let body = BodyDefinition { bullet: at % 3 == 1, ..body.moving(random.vector(speed), random.vector(spin)) };
+        let shape = if at % 3 == 0 { rods[at / 3 % 3].clone() } else { random.shape() };
+        add(world, &body, &ShapeDefinition::new(shape).restitution(0.5));
+    }
+}
+
+/// Corners of a bar along y.
+fn bar(half: f32) -> Vec<Vec3> {
+    let side = |i: u32, bit: u32, half: f32| if i >> bit & 1 == 1 { half } else { -half };
+    (0..8).map(|i| Vec3::new(side(i, 0, 0.01), side(i, 1, half), side(i, 2, 0.01))).collect()
+}
+
+/// Bodies of all shapes, some with easy friction one way, are thrown up through one-way platforms, of which one moves,
+/// and fall on belts, of which one turns. Hooks make ice of every third contact.
+fn surfaces(world: &mut World) {
+    let belt = ShapeDefinition::new(cuboid(6.0, 1.0, 12.0)).friction(0.8);
+    let fixed = BodyDefinition::fixed().at(Vec3::new(-6.0, -1.0, 0.0));
+    add(world, &fixed, &belt.clone().tangent_velocity(Vec3::X * 2.0));
+    let turning = BodyDefinition::kinematic().at(Vec3::new(6.0, -1.0, 0.0)).moving(Vec3::ZERO, Vec3::Y * 0.3);
+    add(world, &turning, &belt.tangent_velocity(Vec3::Z * -1.5));
+    let platform = ShapeDefinition::new(cuboid(5.0, 0.1, 5.0)).one_way(Vec3::Y);
+    add(world, &BodyDefinition::fixed().at(Vec3::Y * 2.5), &platform);
+    add(world, &BodyDefinition::kinematic().at(Vec3::Y * 4.0).moving(Vec3::Y * -0.5, Vec3::ZERO), &platform);
+    let gate = BodyDefinition::fixed().at(Vec3::Y * 2.0);
+    add(world, &gate, &ShapeDefinition::new(cuboid(3.0, 1.0, 3.0)).sensor());
+    let mut random = Random(47);
+    for at in 0..200 {
+        let place = Vec3::new((at % 10) as f32 - 4.5, (at / 100) as f32 + 0.7, (at / 10 % 10) as f32 - 4.5) * 1.05;
+        let body = BodyDefinition::dynamic().at(place).rotated(random.rotation());
+        let body = body.moving(random.vector(2.0) + Vec3::Y * 9.0, random.vector(3.0));
+        let shape = ShapeDefinition::new(random.shape()).restitution(0.2);
+        let shape = if at % 2 == 0 { shape.anisotropy(Vec3::X, 0.1) } else { shape };
+        let events = if at % 3 == 0 { ContactEvents::ALL } else { ContactEvents::NONE };
+        add(world, &body, &shape.events(events));
+    }
+    world.on_pre_solve(Box::new(|context, id| {
+        if let Some(arbiter) = context.arbiter_mut(id) {
+            arbiter.data_mut().set_friction(0.05).unwrap();
+        }
+    }));
+}
+
+/// The hits of a step push bodies in the next one: the order and numbers of the events are part of the hash.
+fn ask_for_surfaces(world: &mut World, _: usize) {
+    let hits: Vec<(BodyId, f32)> = world.hit_events().iter().map(|hit| (hit.body2, hit.impulse)).collect();
+    for (body, impulse) in hits {
+        let _ = world.body_mut(body).unwrap().apply_impulse(Vec3::new(0.1, 0.0, -0.1) * impulse);
+    }
 }
 
 fn settings(threads: usize, simd: SimdLevel) -> WorldSettings {
@@ -324,13 +394,25 @@ fn golden_coming_and_going() {
 /// Shapes made of parts, and floors of many shapes.
 #[test]
 fn golden_compounds_and_voxels() {
+    check(8);
+}
+
+/// One-way platforms, belts, friction that differs along a direction, hooks and hits.
+#[test]
+fn golden_surfaces() {
     check(6);
+}
+
+/// Rods that spin, bullets and a door.
+#[test]
+fn golden_rods_and_bullets() {
+    check(7);
 }
 
 /// The scenes do what they are for: they have contacts, sleepers and motion.
 #[test]
 fn the_scenes_are_worth_hashing() {
-    for (scene, contacts) in SCENES.iter().zip([500, 300, 400, 50, 150, 100, 200]) {
+    for (scene, contacts) in SCENES.iter().zip([500, 300, 400, 50, 150, 100, 150, 5, 200]) {
         let mut world = World::new(settings(1, SimdLevel::best())).unwrap();
         let hashes = play(&mut world, scene);
         let found = world.contact_count();

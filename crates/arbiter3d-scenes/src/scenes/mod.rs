@@ -3,9 +3,11 @@
 pub(crate) mod behaviour;
 pub(crate) mod colosseum;
 pub(crate) mod drums;
+pub(crate) mod fast;
 pub(crate) mod fields;
 pub(crate) mod piles;
 pub(crate) mod stacks;
+pub(crate) mod surfaces;
 pub(crate) mod trees;
 
 #[cfg(test)]

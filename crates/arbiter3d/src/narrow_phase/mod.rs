@@ -35,8 +35,8 @@ mod triangle_lanes;
 mod triangle_solid;
 
 pub(crate) use cuboid::{CuboidLanes, CuboidPair, Near as NearCuboids, WideManifold};
-pub(crate) use distance::closest;
-pub(crate) use seam::{Cast, Patch, scale_of};
+pub(crate) use distance::{Cast, CastPoint, closest, linear_cast};
+pub(crate) use seam::{Cast as SeamCast, Patch, scale_of};
 pub(crate) use support::Support;
 pub(crate) use time_of_impact::{Sweep, gap, time_of_impact};
 

@@ -3,20 +3,13 @@
 //! A cylinder is the part of an endless one between two planes, a cone the part of an endless one over a plane: the line is
 //! inside for an interval of each, and enters the shape where the last of them begins. The quadratics are solved in `f64`.
 //!
-//! Any other convex shape is approached: from the point `o + t d`, with `q` the closest point of the shape at a distance `s`
-//! along the unit normal `n`, no point before `t + s / (−n · d)` is inside (a plane square to `n` at `q` parts them). Source:
-//! van den Bergen, "Ray Casting against General Convex Objects with Application to Continuous Collision Detection", 2004.
+//! Any other convex shape is met by a point that is cast at it (`narrow_phase::linear_cast`).
 
 use super::ray::{Ray, ShapeHit};
 use crate::math::{Pose, Real, Vec3};
-use crate::narrow_phase::{Support, closest};
-use crate::shape::{Cone, Cylinder, Sphere};
+use crate::narrow_phase::{Cast, Support, linear_cast};
+use crate::shape::{Cone, Cylinder};
 use glam::DVec3;
-
-/// Rounds of the approach at most: round shapes need about ten.
-const MAX_ROUNDS: usize = 48;
-/// The surface is reached at this share of the shape's size.
-const REACHED: Real = 2e-7;
 
 /// Where a line is inside something, and the outward normal where it enters.
 #[derive(Clone, Copy)]
@@ -119,34 +112,15 @@ pub(crate) fn cast_cone(cone: &Cone, ray: &Ray) -> Option<ShapeHit> {
 
 /// Any bounded convex shape.
 pub(crate) fn cast_support(support: &Support<'_>, ray: &Ray) -> Option<ShapeHit> {
-    let point = Support::Sphere(Sphere::new(1.0).ok()?); // its core is a point
-    let direction = ray.direction.as_dvec3();
-    if !(ray.origin.is_finite() && ray.direction.is_finite()) {
+    if !(ray.origin.is_finite() && ray.direction.is_finite() && ray.max_fraction >= 0.0) {
         return None;
     }
-    let (center, _) = support.inner_ball();
-    let reached = REACHED * support.reach(center);
-    let (mut t, mut normal) = (0.0, Vec3::ZERO);
-    for _ in 0..MAX_ROUNDS {
-        let at = (ray.origin.as_dvec3() + direction * t).as_vec3();
-        let found = closest(support, &point, &Pose::from_position(at));
-        let gap = found.map_or(-1.0, |found| found.distance - support.radius());
-        let Some(found) = found.filter(|_| gap > 0.0) else {
-            return Some(ShapeHit { fraction: t as Real, normal });
-        };
-        normal = found.normal;
-        let closing =
-            -f64::from(normal.x) * direction.x - f64::from(normal.y) * direction.y - f64::from(normal.z) * direction.z;
-        if closing <= 0.0 {
-            return None;
-        }
-        if gap <= reached {
-            break;
-        }
-        t += f64::from(gap) / closing;
-        if t > f64::from(ray.max_fraction) {
-            return None;
-        }
+    let probe = Support::Triangle([Vec3::ZERO; 3]);
+    let start = Pose::from_position(ray.origin);
+    let size = support.reach(support.inner_ball().0);
+    match linear_cast((support, &probe), &start, ray.direction, ray.max_fraction, size) {
+        Cast::Miss => None,
+        Cast::Overlap => Some(ShapeHit::INSIDE),
+        Cast::Hit(hit) => Some(ShapeHit { fraction: hit.fraction, normal: hit.normal }),
     }
-    Some(ShapeHit { fraction: t as Real, normal })
 }

@@ -6,10 +6,11 @@
 
 use super::geometry::Geometry;
 use super::mass::Moments;
-use super::mesh_tree::{MeshTree, Slabs};
+use super::mesh_tree::{Descent, LEAF, MeshTree, Slabs};
 use super::{MassProperties, Shape, ShapeError, Surface};
 use crate::math::{Aabb, Mat3, Pose, Quat, Real, Rotation, Vec3, max};
 use crate::query::{Ray, ShapeHit, cast_ray};
+use crate::simd::{LaneVec3, Lanes};
 use glam::DMat3;
 
 /// Compounds of up to so many children have the box around their children, larger ones the box around their box.
@@ -160,30 +161,15 @@ impl Compound {
         if !(ray.origin.is_finite() && ray.direction.is_finite()) {
             return None;
         }
-        let mut best: Option<(usize, ShapeHit)> = None;
-        let slabs = Slabs::new(ray.origin, ray.direction);
-        self.tree.cast(&slabs, ray.max_fraction, |at| {
-            let placed = &self.placed[at];
-            let limit = best.map_or(ray.max_fraction, |(_, hit)| hit.fraction);
-            let local = Ray {
-                origin: placed.pose.inverse_transform_point(ray.origin),
-                direction: placed.pose.rotation.inverse_rotate(ray.direction),
-                max_fraction: limit,
-            };
-            let number = placed.child as usize;
-            if let Some(hit) = cast_ray(&self.children[number].shape, &local)
-                && best.is_none_or(|(child, old)| hit.fraction < old.fraction || child > number)
-            {
-                best = Some((number, ShapeHit { normal: placed.pose.rotation.rotate(hit.normal), ..hit }));
-            }
-            best.map_or(ray.max_fraction, |(_, hit)| hit.fraction)
-        });
-        best
+        let slabs = Slabs::of_point(ray.origin, ray.direction);
+        let mut search = ChildSearch { compound: self, ray, slabs, best: None };
+        self.tree.descend(ray.max_fraction, &mut search);
+        search.best
     }
 
     /// Calls `visit` with the number, the shape and the pose of each child whose box overlaps `aabb`, always in the same
     /// order.
-    pub fn for_each_child(&self, aabb: &Aabb, mut visit: impl FnMut(usize, &Shape, &Pose)) {
+    pub fn for_each_child<'a>(&'a self, aabb: &Aabb, mut visit: impl FnMut(usize, &'a Shape, &'a Pose)) {
         self.tree.query(aabb, |at| {
             let placed = &self.placed[at];
             if placed.aabb.overlaps(aabb) {
@@ -213,6 +199,48 @@ impl Compound {
             triangles.extend(surface.1.iter().map(|triangle| triangle.map(|corner| corner + first)));
         }
         (corners, triangles)
+    }
+}
+
+/// The first child along a ray.
+struct ChildSearch<'a> {
+    compound: &'a Compound,
+    ray: &'a Ray,
+    slabs: Slabs,
+    best: Option<(usize, ShapeHit)>,
+}
+
+impl ChildSearch<'_> {
+    /// Casts the ray at a child, in the order of the tree. Returns how far is still of interest.
+    fn cast_at(&mut self, at: usize, limit: Real) -> Real {
+        let placed = &self.compound.placed[at];
+        let local = Ray {
+            origin: placed.pose.inverse_transform_point(self.ray.origin),
+            direction: placed.pose.rotation.inverse_rotate(self.ray.direction),
+            max_fraction: limit,
+        };
+        let number = placed.child as usize;
+        let Some(hit) = cast_ray(&self.compound.children[number].shape, &local) else { return limit };
+        if self.best.is_none_or(|(child, old)| hit.fraction < old.fraction || child > number) {
+            self.best = Some((number, ShapeHit { normal: placed.pose.rotation.rotate(hit.normal), ..hit }));
+        }
+        hit.fraction
+    }
+}
+
+impl Descent for ChildSearch<'_> {
+    #[inline(always)]
+    fn distances<W: Lanes<LEAF>>(&self, low: &LaneVec3<W>, high: &LaneVec3<W>, limit: Real) -> W {
+        self.slabs.enter(low, high, limit)
+    }
+
+    #[inline(always)]
+    fn leaf<W: Lanes<LEAF>>(&mut self, first: usize, count: usize, limit: Real) -> Real {
+        let mut limit = limit;
+        for at in first..first + count {
+            limit = self.cast_at(at, limit);
+        }
+        limit
     }
 }
 

@@ -14,7 +14,7 @@ use super::super::shapes::ShapeSlot;
 use crate::arbiter::{Arbiter, ContactData, HIDDEN, NONE, ONE_NORMAL, SLOTS};
 use crate::edge_lists::EdgeLists;
 use crate::math::{Pose, Real, Vec3};
-use crate::narrow_phase::{Cast, Patch, scale_of};
+use crate::narrow_phase::{Patch, SeamCast as Cast, scale_of};
 use crate::parallel::{SharedSlice, StagePool};
 use crate::query::{Ray, ShapeHit};
 use crate::solver::SolverBodies;
