@@ -174,6 +174,12 @@ pub static SCENES: &[Scene] = &[
         build: scenes::piles::mesh_rain,
     },
     Scene {
+        name: "compound_rain",
+        description: "512 compounds of three to six parts rain into a pit of voxels and of a compound",
+        size: Size::new("bodies", 512, 1_000_000),
+        build: scenes::piles::compound_rain,
+    },
+    Scene {
         name: "mesh_rain10k",
         description: "10,000 mixed bodies rain on a wavy mesh",
         size: Size::new("bodies", 10_000, 1_000_000),
@@ -262,6 +268,12 @@ pub static SCENES: &[Scene] = &[
         description: "boxes with friction 0, 0.1, … 1 on a slope of 30°: those above 0.577 stick",
         size: Size::FIXED,
         build: scenes::behaviour::ramps,
+    },
+    Scene {
+        name: "box_floor_slide",
+        description: "16 bodies slide without friction over a floor of 1,024 separate boxes",
+        size: Size::FIXED,
+        build: scenes::behaviour::box_floor_slide,
     },
     Scene {
         name: "bounce",

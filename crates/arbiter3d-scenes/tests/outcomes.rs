@@ -50,6 +50,34 @@ fn boxes_on_the_ramp_slide_as_coulomb_says() {
     }
 }
 
+/// Without friction nothing on a level floor slows down, rises or turns off, whatever the floor is made of: 16 m each.
+#[test]
+fn a_floor_of_boxes_feels_like_one() {
+    let mut scene = built("box_floor_slide");
+    let start = positions(&scene.world);
+    run(&mut scene, 240);
+    for (from, to) in start.iter().zip(positions(&scene.world)) {
+        let along = Vec3::new(from.x, 0.0, from.z) / 3.0;
+        let expected = *from + along * 16.0;
+        assert!((to - expected).length() < 0.005, "from {from} to {to}, not {expected}");
+    }
+}
+
+/// Compounds fill the pit and stay in it, and lie still.
+#[test]
+fn compounds_come_to_rest_in_the_pit() {
+    let options = SceneOptions { size: Some(192), ..SceneOptions::default() };
+    let mut scene = find("compound_rain").unwrap().build(&options).unwrap();
+    run(&mut scene, 600);
+    for id in dynamic(&scene.world) {
+        let body = scene.world.body(id).unwrap();
+        let at = body.position();
+        assert!(at.y > 0.0 && at.x.abs() < 12.0 && at.z.abs() < 12.0, "{id:?} at {at}");
+        assert!(body.linear_velocity().length() < 0.3, "{id:?} moves at {}", body.linear_velocity());
+    }
+    assert!(scene.world.deepest_penetration() < 0.02, "{} m", scene.world.deepest_penetration());
+}
+
 /// A ball with restitution e that falls from h rises to e² h.
 #[test]
 fn balls_rise_by_the_square_of_their_restitution() {

@@ -51,10 +51,12 @@ pub use character::{
     solve_planes,
 };
 pub use query::{Ray, ShapeCast, ShapeDistance, ShapeHit, cast_ray, distance, overlaps};
+#[cfg(feature = "decomposition")]
+pub use shape::DecompositionSettings;
 pub use shape::{
-    Capsule, Cone, ConvexHull, ConvexShape, Cuboid, Custom, Cylinder, FieldDiagonals, FieldSide, HalfEdge, HalfSpace,
-    HeightField, MassProperties, MeshRayHit, MeshSides, Plane, PointCloud, Rounded, Shape, ShapeError, Sphere,
-    TaperedCapsule, Transformed, Triangle, TriangleMesh,
+    Capsule, Compound, CompoundChild, Cone, ConvexHull, ConvexShape, Cuboid, Custom, Cylinder, FieldDiagonals,
+    FieldSide, HalfEdge, HalfSpace, HeightField, MassProperties, MeshRayHit, MeshSides, Plane, PointCloud, Rounded,
+    Shape, ShapeError, Sphere, TaperedCapsule, Transformed, Triangle, TriangleMesh, VoxelGrid,
 };
 pub use simd::{SimdLevel, UnknownSimdLevel};
 pub use vehicle::{

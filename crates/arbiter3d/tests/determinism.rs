@@ -1,4 +1,4 @@
-//! The same bits for any number of threads and any SIMD level: eight scenes against checked-in hashes.
+//! The same bits for any number of threads and any SIMD level: nine scenes against checked-in hashes.
 //!
 //! The state hash is taken after each tenth step and folded into one number a scene. After a change that is meant to alter
 //! results, print the new table with
@@ -13,21 +13,22 @@ mod common;
 
 use arbiter3d::math::Vec3;
 use arbiter3d::{
-    ArbiterKey, BodyDefinition, BodyId, BodyKind, ContactEvents, ContactPoint, ContactProvider, LockedAxes, Shape,
-    ShapeDefinition, SimdLevel, StepContext, World, WorldSettings,
+    ArbiterKey, BodyDefinition, BodyId, BodyKind, CompoundChild, ContactEvents, ContactPoint, ContactProvider,
+    LockedAxes, Shape, ShapeDefinition, SimdLevel, StepContext, World, WorldSettings,
 };
 use common::*;
 
 /// The hashes of the scenes, in their order.
-const GOLDEN: [(&str, u64); 8] = [
+const GOLDEN: [(&str, u64); 9] = [
     ("pile", 0xaac7_fc32_c6dd_5cd4),
     ("hulls", 0x7d4f_1a72_0999_6ad2),
     ("mesh rain", 0x5dbb_e991_fd15_42a9),
     ("bullets", 0x75d1_ec1d_6776_8a2b),
     ("custom contacts", 0xf4d2_df3a_d912_e6b7),
-    ("coming and going", 0x61e5_ab28_4389_24db),
-    ("surfaces", 0x75da_f17e_e1a8_66ff),
+    ("coming and going", 0x8701_bac0_274c_2094),
+    ("surfaces", 0x3d59_6268_6154_9bc5),
     ("rods and bullets", 0x945b_21b6_158d_4406),
+    ("compounds and voxels", 0xc6bf_573a_b3da_da05),
 ];
 
 /// A scene: how it begins, and what is done before each step.
@@ -38,7 +39,7 @@ struct Scene {
     before_step: fn(&mut World, usize),
 }
 
-const SCENES: [Scene; 8] = [
+const SCENES: [Scene; 9] = [
     Scene { name: "pile", steps: 180, build: pile, before_step: |_, _| {} },
     Scene { name: "hulls", steps: 150, build: hulls, before_step: |_, _| {} },
     Scene { name: "mesh rain", steps: 180, build: mesh_rain, before_step: |_, _| {} },
@@ -47,6 +48,7 @@ const SCENES: [Scene; 8] = [
     Scene { name: "coming and going", steps: 300, build: coming_and_going, before_step: come_and_go },
     Scene { name: "surfaces", steps: 180, build: surfaces, before_step: ask_for_surfaces },
     Scene { name: "rods and bullets", steps: 120, build: rods_and_bullets, before_step: |_, _| {} },
+    Scene { name: "compounds and voxels", steps: 150, build: compounds_and_voxels, before_step: |_, _| {} },
 ];
 
 /// Bodies of all shapes on a lattice over the origin, each turned and moving at random.
@@ -165,6 +167,37 @@ fn coming_and_going(world: &mut World) {
     scatter(world, 120, 0.0, &mut Random(46));
     let spinner = BodyDefinition::kinematic().at(Vec3::Y * 0.5).moving(Vec3::ZERO, Vec3::Y * 1.0);
     add(world, &spinner, &ShapeDefinition::new(cuboid(3.0, 0.2, 0.2)));
+}
+
+/// Compounds, voxel blocks and others fall on a pit of voxels beside a floor of separate boxes and one of a compound.
+fn compounds_and_voxels(world: &mut World) {
+    let pit = (0..256).flat_map(|at| [[at % 16, -1, at / 16], [0, at / 16, at % 16], [at / 16, at % 3, 0]]);
+    let pit = ShapeDefinition::new(Shape::voxels(0.5, pit).unwrap()).at(Vec3::new(-4.0, 0.0, -4.0));
+    world.add_shape(BodyId::WORLD, &pit).unwrap();
+    let tile = |at: i32| Vec3::new((at % 8) as f32 + 4.5, -0.5, (at / 8) as f32 - 3.5);
+    for at in 0..32 {
+        world.add_shape(BodyId::WORLD, &ShapeDefinition::new(cube(0.5)).at(tile(at))).unwrap();
+    }
+    let tiles: Vec<_> = (32..64).map(|at| CompoundChild::new(cube(0.5)).at(tile(at))).collect();
+    world.add_shape(BodyId::WORLD, &ShapeDefinition::new(Shape::compound(&tiles).unwrap())).unwrap();
+    let mut random = Random(47);
+    for at in 0..120 {
+        let shape = match at % 3 {
+            0 => {
+                let child = |k: usize| CompoundChild::new(random_shape(k)).at(Vec3::Y * (0.3 * k as f32 - 0.3));
+                Shape::compound(&[0, 1, 2].map(child)).unwrap()
+            }
+            1 => Shape::voxels(0.15, (0..12).map(|k| [k % 3, k / 3 % 2, k * at % 4])).unwrap(),
+            _ => random.shape(),
+        };
+        let place = Vec3::new((at % 12) as f32 - 2.0, (at / 48) as f32 * 1.5 + 1.5, (at / 12 % 4) as f32 * 1.5 - 2.5);
+        let body = BodyDefinition::dynamic().at(place + random.vector(0.1)).rotated(random.rotation());
+        add(world, &body.moving(random.vector(2.0), random.vector(3.0)), &ShapeDefinition::new(shape));
+    }
+}
+
+fn random_shape(kind: usize) -> Shape {
+    [sphere(0.2), cuboid(0.3, 0.1, 0.2), capsule(0.2, 0.1)][kind].clone()
 }
 
 /// Adds, removes, pushes, teleports and changes bodies; for the last part all is left alone, and sleeps in part.
@@ -358,6 +391,12 @@ fn golden_coming_and_going() {
     check(5);
 }
 
+/// Shapes made of parts, and floors of many shapes.
+#[test]
+fn golden_compounds_and_voxels() {
+    check(8);
+}
+
 /// One-way platforms, belts, friction that differs along a direction, hooks and hits.
 #[test]
 fn golden_surfaces() {
@@ -373,7 +412,7 @@ fn golden_rods_and_bullets() {
 /// The scenes do what they are for: they have contacts, sleepers and motion.
 #[test]
 fn the_scenes_are_worth_hashing() {
-    for (scene, contacts) in SCENES.iter().zip([500, 300, 400, 50, 150, 100, 150, 5]) {
+    for (scene, contacts) in SCENES.iter().zip([500, 300, 400, 50, 150, 100, 150, 5, 200]) {
         let mut world = World::new(settings(1, SimdLevel::best())).unwrap();
         let hashes = play(&mut world, scene);
         let found = world.contact_count();

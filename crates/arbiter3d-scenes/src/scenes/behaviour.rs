@@ -28,6 +28,28 @@ pub(crate) fn ramps(options: &SceneOptions, size: usize) -> Result<BuiltScene, E
     scene.finish(240)
 }
 
+/// Sixteen bodies slide without friction at 4 m/s, each its own way, over a floor of 1,024 separate boxes; every other one is
+/// a ball.
+pub(crate) fn box_floor_slide(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
+    const HALF: i32 = 16;
+    const BODIES: usize = 16;
+    let mut scene = Builder::sleepless(options, size)?;
+    let smooth = |shape: Shape| ShapeDefinition::new(shape).friction(0.0).rolling_resistance(0.0);
+    let tile = smooth(Shape::cuboid(Vec3::new(0.75, 0.5, 0.75))?);
+    for at in (-HALF..HALF).flat_map(|x| (-HALF..HALF).map(move |z| (x, z))) {
+        let position = Vec3::new(1.5 * (at.0 as Real + 0.5), -0.5, 1.5 * (at.1 as Real + 0.5));
+        scene.add(&BodyDefinition::fixed().at(position), &tile)?;
+    }
+    let shapes = [smooth(Shape::cuboid(Vec3::new(0.3, 0.25, 0.4))?), smooth(Shape::sphere(0.25)?)];
+    for index in 0..BODIES {
+        let turn = about(Vec3::Y, (index as Real + 0.3) * 2.0 * std::f32::consts::PI / BODIES as Real);
+        let along = turn * Vec3::X;
+        let body = BodyDefinition::dynamic().at(along * 3.0 + Vec3::Y * 0.25).rotated(turn);
+        scene.add(&body.moving(along * 4.0, Vec3::ZERO), &shapes[index % 2])?;
+    }
+    scene.finish(240)
+}
+
 /// Eleven balls with restitution 0, 0.1, … 1 fall 5 m: each rises to the square of its restitution times 5 m.
 pub(crate) fn bounce(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
     const RADIUS: Real = 0.5;

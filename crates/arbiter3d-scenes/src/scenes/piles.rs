@@ -2,10 +2,11 @@
 
 use crate::builder::{Builder, Mixed, cuboid, plain};
 use crate::meshes::{fibonacci_sphere, prism, surface};
+use crate::random::Random;
 use crate::turns::sin_cos;
 use crate::{BuiltScene, SceneOptions};
 use arbiter3d::{
-    BodyDefinition, BodyId, Error, Shape, ShapeDefinition, World,
+    BodyDefinition, BodyId, CompoundChild, Error, Shape, ShapeDefinition, World,
     math::{Real, Vec3},
 };
 
@@ -115,6 +116,46 @@ pub(crate) fn mesh_rain(options: &SceneOptions, size: usize) -> Result<BuiltScen
         scene.drop(position + scatter(), mixed.get(x + z + y))?;
     }
     scene.finish(200)
+}
+
+/// Compounds of three to six parts, 8 × 8 a layer, rain into a pit: one half of its floor is voxels, the other a compound of
+/// boxes.
+pub(crate) fn compound_rain(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
+    const HALF: i32 = 12;
+    let mut scene = Builder::new(options, size)?;
+    let inside = |x: i32, z: i32| x > -HALF && z > -HALF && x < HALF - 1 && z < HALF - 1;
+    let all = || (-HALF..HALF).flat_map(|x| (-HALF..HALF).map(move |z| (x, z)));
+    // Hills of one cell in places, walls of five around.
+    let height = |x: i32, z: i32| if inside(x, z) { i32::from((x * x + 3 * z) % 11 == 0) } else { 5 };
+    let cells = all().filter(|&(x, _)| x < 0).flat_map(|(x, z)| (-1..height(x, z)).map(move |y| [x, y, z]));
+    scene.add(&BodyDefinition::fixed(), &plain(Shape::voxels(1.0, cells)?))?;
+    let block = |(x, z): (i32, i32)| {
+        let top = height(x, z) as Real;
+        let shape = Shape::cuboid(Vec3::new(0.5, 0.5 * (top + 1.0), 0.5))?;
+        Ok(CompoundChild::new(shape).at(Vec3::new(x as Real + 0.5, 0.5 * (top - 1.0), z as Real + 0.5)))
+    };
+    let blocks = all().filter(|&(x, _)| x >= 0).map(block).collect::<Result<Vec<_>, Error>>()?;
+    scene.add(&BodyDefinition::fixed(), &plain(Shape::compound(&blocks)?))?;
+    let mut random = scene.random(11);
+    let kinds = (0..8).map(|kind| compound_of(3 + kind % 4, &mut random)).collect::<Result<Vec<_>, Error>>()?;
+    for index in 0..scene.size {
+        let (layer, x, z) = (index / 64, index / 8 % 8, index % 8);
+        let position = Vec3::new(2.4 * (x as Real - 3.5), 3.0 + 1.8 * layer as Real, 2.4 * (z as Real - 3.5));
+        let body = BodyDefinition::dynamic().at(position).rotated(random.rotation());
+        scene.add(&body, &plain(kinds[index % kinds.len()].clone()))?;
+    }
+    scene.finish(300)
+}
+
+/// A bunch of boxes, balls and capsules about the origin.
+fn compound_of(parts: usize, random: &mut Random) -> Result<Shape, Error> {
+    let shapes = [Shape::cuboid(Vec3::new(0.35, 0.15, 0.2))?, Shape::sphere(0.25)?, Shape::capsule(0.3, 0.12)?];
+    let mut children = Vec::with_capacity(parts);
+    for part in 0..parts {
+        let child = CompoundChild::new(shapes[part % 3].clone()).at(random.in_cube(0.35)).rotated(random.rotation());
+        children.push(child);
+    }
+    Ok(Shape::compound(&children)?)
 }
 
 /// Adds a floor with four walls of `height`; `inner` is half the inner width, metres.

@@ -29,6 +29,8 @@ fn scenes_have_their_published_counts() {
         ("convex_vs_mesh", None, 1764),
         ("mesh_rain", None, 2048),
         ("mesh_rain10k", None, 10_000),
+        ("compound_rain", None, 512),
+        ("box_floor_slide", None, 16),
         ("spheres10k", None, 10_000),
         ("trees100", None, 50),
         ("sleeping_field", None, 100_100),

@@ -11,7 +11,7 @@
 //! `|d₁ × d₂| / 2`; halves and square roots cancel in the comparison.
 //! Source of the scheme: Bullet's persistent manifold, by way of Jitter Physics.
 
-use super::contact_data::{Contact, ContactData, ONE_NORMAL, SLOTS};
+use super::contact_data::{Contact, ContactData, HIDDEN, ONE_NORMAL, SLOTS};
 use crate::math::{Pose, Real, Vec3};
 
 /// Areas that differ by less than this share count as equal.
@@ -28,7 +28,7 @@ impl ContactData {
     ///
     /// Distances are measured in the axes of body 1, where `local_anchor1` lives.
     pub(crate) fn add(&mut self, mut contact: Contact, break_distance: Real) {
-        self.flags &= !ONE_NORMAL;
+        self.flags &= !(ONE_NORMAL | HIDDEN);
         let near = |old: &Contact| (old.local_anchor1 - contact.local_anchor1).length_squared();
         let limit = break_distance * break_distance;
         if self.usage_mask & 15 == 15 {

@@ -165,6 +165,8 @@ pub(crate) const TANGENT_VELOCITY_OVERRIDDEN: u8 = 4;
 pub(crate) const ROLLING_OVERRIDDEN: u8 = 8;
 /// All contacts have the bit-equal normal and nothing removed: one row holds them all.
 pub(crate) const ONE_NORMAL: u8 = 16;
+/// All contacts are with inner edges or faces of what several shapes make together: they are not solved.
+pub(crate) const HIDDEN: u8 = 128;
 /// Friction differs along a direction.
 pub(crate) const ANISOTROPIC: u8 = 32;
 /// The user has set that direction, or that there is none.

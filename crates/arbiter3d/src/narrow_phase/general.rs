@@ -269,8 +269,8 @@ impl Figure {
     fn clip_face(&self, other: &Self, out: &mut [ClipPoint; CLIPPED]) -> usize {
         let mut buffer = [ClipPoint::default(); CLIPPED];
         let (mut front, mut back) = (out, &mut buffer);
-        for k in 0..other.count {
-            front[k] = ClipPoint { position: other.corners[k], separation: 0.0, feature: (k as u32 + 1) << 12 };
+        for (k, (point, &position)) in front.iter_mut().zip(&other.corners[..other.count]).enumerate() {
+            *point = ClipPoint { position, separation: 0.0, feature: (k as u32 + 1) << 12 };
         }
         let mut count = other.count;
         for k in 0..self.count {

@@ -1,7 +1,7 @@
 //! Contacts between two shapes: which points touch, along which normal, how deep.
 //!
 //! [`collide`] sorts a pair by the kind of its shapes, so that each kernel is written once, with the more complex
-//! shape in the role of shape 1: mesh, hull, cuboid, capsule, sphere. Where the caller's order is the other one, the
+//! shape in the role of shape 1: compound, voxels, mesh, hull, cuboid, capsule, sphere. Where the caller's order is the other one, the
 //! result is mirrored.
 //!
 //! Every kernel keeps these laws:
@@ -15,6 +15,7 @@
 
 mod capsule;
 mod clip;
+mod composite;
 mod cuboid;
 mod distance;
 mod general;
@@ -25,6 +26,7 @@ mod mesh;
 mod mesh_points;
 mod penetration;
 mod polyhedron;
+mod seam;
 mod sphere;
 mod support;
 mod surfaces;
@@ -35,6 +37,7 @@ mod triangle_solid;
 
 pub(crate) use cuboid::{CuboidLanes, CuboidPair, Near as NearCuboids, WideManifold};
 pub(crate) use distance::{Cast, CastPoint, closest, linear_cast};
+pub(crate) use seam::{Cast as SeamCast, Patch, scale_of};
 pub(crate) use support::Support;
 pub(crate) use time_of_impact::{Sweep, gap, time_of_impact};
 
@@ -111,6 +114,8 @@ fn rank(shape: &Shape) -> u8 {
         Shape::Hull(_) => 3,
         Shape::HalfSpace(_) => 6,
         Shape::Mesh(_) | Shape::HeightField(_) => 5,
+        Shape::Voxels(_) => 7,
+        Shape::Compound(_) => 8,
         _ => 4,
     }
 }
@@ -134,6 +139,8 @@ fn collide_sorted(
         (Shape::Hull(a), Shape::Capsule(b)) => capsule::hull_capsule(a, b, pose, margin, manifold),
         (Shape::Hull(a), Shape::Cuboid(b)) => hull::collide(level, (a, b), pose, margin, (cache, manifold)),
         (Shape::Hull(a), Shape::Hull(b)) => hull::collide(level, (a, &**b), pose, margin, (cache, manifold)),
+        (Shape::Compound(a), other) => composite::collide(level, (&**a, other), pose, margin, manifold),
+        (Shape::Voxels(a), other) => composite::collide(level, (&**a, other), pose, margin, manifold),
         (Shape::HalfSpace(_), other) => half_space::collide(other, pose, margin, manifold),
         (Shape::Mesh(_) | Shape::HeightField(_), other) => collide_surface(shape1, other, pose, margin, manifold),
         _ => general::collide((shape1, shape2), pose, margin, manifold),

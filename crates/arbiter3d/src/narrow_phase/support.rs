@@ -51,6 +51,7 @@ impl<'a> Support<'a> {
             Shape::Transformed(s) => Self::Transformed(s),
             Shape::Custom(s) => Self::Custom(s),
             Shape::Mesh(_) | Shape::HeightField(_) | Shape::HalfSpace(_) => return None,
+            Shape::Compound(_) | Shape::Voxels(_) => return None,
         })
     }
 

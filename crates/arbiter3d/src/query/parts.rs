@@ -5,9 +5,11 @@
 //! it has a [`Support`]. A new kind of composite needs one arm in [`visit_parts`], which hands over every part whose
 //! box the region meets: nearest first if it has a tree of its own, else in any order.
 
-use crate::math::{Aabb, Pose, Real, Vec3, abs3, max, max3, min};
+use crate::math::{Aabb, Pose, Real, Vec3, abs3, max, max3, min, min3};
 use crate::narrow_phase::Support;
-use crate::shape::{Cuboid, Descent, HeightField, LEAF, MeshSides, Shape, Slabs, TriangleMesh, box_distances};
+use crate::shape::{
+    Compound, Cuboid, Descent, Geometry, HeightField, LEAF, MeshSides, Shape, Slabs, TriangleMesh, box_distances,
+};
 use crate::simd::{LaneVec3, Lanes};
 
 /// A convex part of a shape.
@@ -111,6 +113,12 @@ pub(crate) enum Region {
 }
 
 impl Region {
+    /// What of a box is in the box around the region; empty where they are apart.
+    pub(crate) fn within(&self, aabb: &Aabb) -> Aabb {
+        let bounds = self.bounds();
+        Aabb::new(max3(bounds.min, aabb.min), min3(bounds.max, aabb.max))
+    }
+
     /// The limit to begin with.
     pub(crate) fn limit(&self) -> Real {
         match self {
@@ -176,6 +184,16 @@ pub(crate) fn visit_parts<'a>(shape: &'a Shape, region: &Region, mut visit: impl
         Shape::Mesh(mesh) => visit_triangles(mesh, region, &mut visit),
         Shape::HeightField(field) => visit_field(field, region, &mut visit),
         Shape::HalfSpace(_) => visit_half_space(region, &mut visit),
+        Shape::Compound(compound) => visit_children(compound, region, &mut visit),
+        Shape::Voxels(grid) => {
+            let mut limit = region.limit();
+            grid.for_each_box(&region.within(&shape.local_aabb()), |_, cuboid, center| {
+                if limit >= 0.0 {
+                    let pose = Some(Pose::from_position(center));
+                    limit = visit(&Part { pose, ..Part::whole(Support::Cuboid(cuboid)) }, limit);
+                }
+            });
+        }
         convex => {
             let limit = region.limit();
             if region.meets(&convex.local_aabb(), limit)
@@ -185,6 +203,23 @@ pub(crate) fn visit_parts<'a>(shape: &'a Shape, region: &Region, mut visit: impl
             }
         }
     }
+}
+
+/// The parts of the children of a compound.
+fn visit_children<'a>(compound: &'a Compound, region: &Region, visit: &mut dyn FnMut(&Part<'a>, Real) -> Real) {
+    let (mut limit, within) = (region.limit(), region.within(&compound.local_aabb()));
+    compound.for_each_child(&within, |child, shape, placed| {
+        let local = Region::Box(within.transform(&placed.inverse()));
+        if limit < 0.0 {
+            return;
+        }
+        let mut hand_on = |part: &Part<'a>, _: Real| {
+            let pose = Some(part.pose.map_or(*placed, |pose| placed.mul(&pose)));
+            limit = visit(&Part { support: part.support, pose, child: Some(child as u32), ..*part }, limit);
+            limit
+        };
+        visit_parts(shape, &local, &mut hand_on as &mut dyn FnMut(&Part<'a>, Real) -> Real);
+    });
 }
 
 /// The part of a half-space that the region can tell from all of it: a block below the region, larger than it.

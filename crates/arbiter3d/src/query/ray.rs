@@ -105,7 +105,13 @@ pub(crate) fn find(shape: &Shape, ray: &Ray) -> Option<PartHit> {
             let hit = ShapeHit { fraction: found.distance, normal: found.normal };
             return Some(PartHit { hit, child: None, triangle: Some(found.triangle) });
         }
-        other if other.is_convex() || matches!(other, Shape::HalfSpace(_)) => other.geometry().cast_ray(ray),
+        Shape::Compound(compound) => {
+            let (child, hit) = compound.cast_ray(ray)?;
+            return Some(PartHit { hit, child: Some(child as u32), triangle: None });
+        }
+        other if other.is_convex() || matches!(other, Shape::HalfSpace(_) | Shape::Voxels(_)) => {
+            other.geometry().cast_ray(ray)
+        }
         other => return cast_parts(other, ray),
     };
     hit.map(|hit| PartHit { hit, child: None, triangle: None })

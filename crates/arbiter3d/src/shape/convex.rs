@@ -123,10 +123,10 @@ pub(crate) fn sphere_grid(steps: usize) -> (Vec<DVec3>, Vec<[u32; 3]>) {
 }
 
 /// Corners and triangles of a surface, counter-clockwise from outside.
-pub(crate) type Surface = (Vec<Vec3>, Vec<[u32; 3]>);
+pub(crate) type DrawnSurface = (Vec<Vec3>, Vec<[u32; 3]>);
 
 /// A surface through the support points of a grid of directions; triangles that these make into a line are left out.
-pub(crate) fn surface_of_support(support: &Support<'_>, steps: usize) -> Surface {
+pub(crate) fn surface_of_support(support: &Support<'_>, steps: usize) -> DrawnSurface {
     let (directions, mut triangles) = sphere_grid(steps);
     let points: Vec<Vec3> = directions.iter().map(|&d| support.full_support(d).as_vec3()).collect();
     triangles.retain(|t| {

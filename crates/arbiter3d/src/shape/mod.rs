@@ -7,14 +7,17 @@
 //! Convex kinds with kernels of their own: spheres, capsules, cuboids, hulls. Convex kinds known to the kernels by their
 //! support function and their features (`convex`): cylinders, cones, tapered capsules, single triangles, point clouds,
 //! anything convex grown by a radius or after an affine map, and shapes of the user's own. Then endless half-spaces, and
-//! what is made of many parts: triangle meshes and height fields.
+//! what is made of many parts: triangle meshes, height fields, compounds of other shapes, voxel grids.
 
 mod capsule;
+mod compound;
 mod cone;
 mod convex;
 mod cuboid;
 mod custom;
 mod cylinder;
+#[cfg(feature = "decomposition")]
+mod decomposition;
 mod geometry;
 mod half_space;
 mod height_field;
@@ -36,13 +39,18 @@ mod surface;
 mod tapered_capsule;
 mod transformed;
 mod triangle;
+mod voxels;
 
 pub use capsule::Capsule;
+pub use compound::{Compound, CompoundChild};
 pub use cone::Cone;
+use convex::DrawnSurface;
 pub(crate) use convex::{FEATURE_POINTS, FLAT_SINE, Feature};
 pub use cuboid::Cuboid;
 pub use custom::{ConvexShape, Custom};
 pub use cylinder::Cylinder;
+#[cfg(feature = "decomposition")]
+pub use decomposition::DecompositionSettings;
 pub(crate) use geometry::Geometry;
 pub use half_space::HalfSpace;
 pub use height_field::{FieldDiagonals, FieldSide, HeightField};
@@ -62,6 +70,7 @@ pub use tapered_capsule::TaperedCapsule;
 pub use transformed::Transformed;
 pub use triangle::Triangle;
 pub(crate) use triangle::triangle_feature;
+pub use voxels::VoxelGrid;
 
 use crate::math::{Aabb, Mat3, Pose, Real, Vec3};
 use crate::narrow_phase::Support;
@@ -221,6 +230,26 @@ pub enum ShapeError {
         /// Upper corner.
         max: Vec3,
     },
+    /// A compound without children.
+    #[error("the compound has no children: give it at least one shape")]
+    NoChildren,
+    /// A child of a compound that cannot be one.
+    #[error("child {child} of the compound {what}")]
+    BadChild {
+        /// Position in the list given.
+        child: usize,
+        /// What is wrong with it, and what to do.
+        what: &'static str,
+    },
+    /// A voxel grid without solid cells.
+    #[error("the voxel grid has no solid cell: remove the shape instead")]
+    NoCells,
+    /// A cell too far from the origin of its grid.
+    #[error("cell {cell:?} is too far out: coordinates of cells go from -1048576 to 1048575")]
+    CellTooFar {
+        /// The cell.
+        cell: [i32; 3],
+    },
 }
 
 /// Checks that a length can be used: finite and above zero.
@@ -270,6 +299,10 @@ pub enum Shape {
     HeightField(Arc<HeightField>),
     /// A convex shape of the user's own.
     Custom(Arc<Custom>),
+    /// Many placed shapes.
+    Compound(Arc<Compound>),
+    /// Solid cells.
+    Voxels(Arc<VoxelGrid>),
 }
 
 impl Shape {
@@ -399,7 +432,7 @@ impl Shape {
         let map = |point: Vec3| linear * point + translation;
         let all = |points: &[Vec3]| points.iter().map(|&point| map(point)).collect::<Vec<_>>();
         match self {
-            Self::Cuboid(s) => Self::hull(&all(&ConvexHull::from_cuboid(s.half_extents())?.vertices().to_vec())),
+            Self::Cuboid(s) => Self::hull(&all(ConvexHull::from_cuboid(s.half_extents())?.vertices())),
             Self::Hull(s) => Self::hull(&all(s.vertices())),
             Self::PointCloud(s) => Self::point_cloud(&all(s.points())),
             Self::Triangle(s) => Self::triangle(s.corners().map(map)),
@@ -411,6 +444,7 @@ impl Shape {
                 let mesh = if s.materials().is_empty() { mesh } else { mesh.with_materials(s.materials().to_vec())? };
                 Ok(Self::Mesh(Arc::new(mesh)))
             }
+            Self::Compound(s) => Ok(Self::Compound(Arc::new(s.transformed(linear, translation)?))),
             _ => Transformed::new(self, linear, translation).map(|shape| Self::Transformed(Arc::new(shape))),
         }
     }
@@ -438,6 +472,29 @@ impl Shape {
         Custom::new(Box::new(shape)).map(|custom| Self::Custom(Arc::new(custom)))
     }
 
+    /// Many placed shapes as one: see [`Compound`].
+    ///
+    /// # Errors
+    /// If there is no child, one is a half-space, or one has a position, rotation or density factor that makes no sense.
+    pub fn compound(children: &[CompoundChild]) -> Result<Self, ShapeError> {
+        Compound::new(children).map(|compound| Self::Compound(Arc::new(compound)))
+    }
+
+    /// Solid cubic cells of `cell_size` metres: see [`VoxelGrid`].
+    ///
+    /// ```
+    /// use arbiter3d::Shape;
+    /// let stairs = Shape::voxels(0.25, (0..8).flat_map(|x| (0..=x).map(move |y| [x, y, 0])))?;
+    /// assert!((stairs.mass_properties(1.0)?.mass - 36.0 * 0.25_f32.powi(3)).abs() < 1e-5);
+    /// # Ok::<(), arbiter3d::ShapeError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// If the size is not a finite length above zero, there is no cell, or one has a coordinate beyond ±2²⁰.
+    pub fn voxels(cell_size: Real, cells: impl IntoIterator<Item = [i32; 3]>) -> Result<Self, ShapeError> {
+        VoxelGrid::new(cell_size, cells).map(|grid| Self::Voxels(Arc::new(grid)))
+    }
+
     /// What tells of the shape, whatever its kind.
     pub(crate) fn geometry(&self) -> &dyn Geometry {
         match self {
@@ -456,6 +513,8 @@ impl Shape {
             Self::Transformed(s) => &**s,
             Self::HeightField(s) => &**s,
             Self::Custom(s) => &**s,
+            Self::Compound(s) => &**s,
+            Self::Voxels(s) => &**s,
         }
     }
 
@@ -547,6 +606,8 @@ impl Shape {
             Self::Mesh(s) => (s.vertices().to_vec(), s.triangles().to_vec()),
             Self::HeightField(s) => s.triangles(),
             Self::Triangle(s) => (s.corners().to_vec(), vec![[0, 1, 2], [0, 2, 1]]),
+            Self::Compound(s) => s.triangulate(steps),
+            Self::Voxels(s) => s.triangulate(),
             Self::HalfSpace(_) => {
                 let corners = [(-1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (1.0, -1.0)];
                 (corners.map(|(x, z)| Vec3::new(100.0 * x, 0.0, 100.0 * z)).to_vec(), vec![[0, 1, 2], [0, 2, 3]])

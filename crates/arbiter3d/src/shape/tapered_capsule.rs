@@ -111,7 +111,7 @@ impl Geometry for TaperedCapsule {
             let radius = cosine * (b + (a - b) * (y - low) / (high - low));
             radius * radius
         };
-        let pieces: [(f64, f64, &dyn Fn(f64) -> f64); 3] =
+        let pieces: [super::mass::RevolvedPiece<'_>; 3] =
             [(-h - b, low, &ball(-h, b)), (low, high, &frustum), (high, h + a, &ball(h, a))];
         Ok(mass_of_revolution(&pieces).scaled(density))
     }

@@ -12,7 +12,7 @@
 //! of the step before, as in a pile at rest, so are the colours.
 
 use super::bodies::SolverBodies;
-use crate::arbiter::{ANISOTROPIC, Arbiter, ArbiterKey, ContactData, Entry, ONE_NORMAL, SLOTS};
+use crate::arbiter::{ANISOTROPIC, Arbiter, ArbiterKey, ContactData, Entry, HIDDEN, ONE_NORMAL, SLOTS};
 use crate::math::Vec3;
 use crate::parallel::{SharedSlice, StagePool};
 use crate::place_table::mix;
@@ -102,7 +102,11 @@ impl Record {
         Self {
             bodies: [arbiter.body1.index, arbiter.body2.index],
             arbiter: index,
-            rows: if data.flags & ONE_NORMAL == 0 { rows_of(data) } else { u16::from(data.usage_mask & 15) },
+            rows: match data.flags & (ONE_NORMAL | HIDDEN) {
+                ONE_NORMAL => u16::from(data.usage_mask & 15),
+                0 => rows_of(data),
+                _ => 0,
+            },
             moves: states.map(|state| state.moves != 0),
             extra,
             first: first_choice(arbiter.key),

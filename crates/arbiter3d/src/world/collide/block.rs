@@ -379,11 +379,16 @@ impl<W: Lanes<L>, const L: usize> BlockKernel<'_, W, L> {
             update_contacts(&mut arbiter.data, places, rotations, context.settings.contact_break_distance);
             if places.count == 0 {
                 self.news.push(News::Empty(pair.arbiter));
+            } else if let Some(body) = context.borne(pair) {
+                self.news.push(News::Borne(body));
             }
         } else if context.begins(pair, places) {
             let [id1, id2] = pair.shapes.map(|slot| context.shapes[slot as usize].id);
             let (key, bodies) = (ArbiterKey::of_shapes(id1, id2), pair.bodies);
             let wakes = bodies.iter().any(|&body| context.bodies[body as usize].can_wake());
+            if let Some(body) = context.borne(pair) {
+                self.news.push(News::Borne(body));
+            }
             self.begins.push(Begin { key, pair: item.pair, bodies, wakes, places: *places });
         }
     }
@@ -459,6 +464,16 @@ impl CollideContext<'_> {
         pair.has_manifold = reusable && self.filters.contact.is_none() && pair.traits & PRE_SOLVE == 0;
         let shapes = pair.shapes.map(|slot| &self.shapes[slot as usize]);
         pair.note_manifold(&fresh.between, self.solver.masses[pair.bodies[0] as usize].rotation, shapes);
+    }
+
+    /// The body of a pair that can be pushed, if the other one cannot.
+    #[inline(always)]
+    fn borne(&self, pair: &Pair) -> Option<u32> {
+        match pair.bodies.map(|body| self.solver.states[body as usize].moves != 0) {
+            [true, false] => Some(pair.bodies[0]),
+            [false, true] => Some(pair.bodies[1]),
+            _ => None,
+        }
     }
 
     /// Whether a new manifold of a pair with a one-way platform counts; see [`one_way`].

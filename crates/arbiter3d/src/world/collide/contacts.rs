@@ -9,7 +9,7 @@
 
 use super::super::pairs::Pair;
 use super::super::shapes::ShapeSlot;
-use crate::arbiter::{Contact, ContactData, ONE_NORMAL, SLOTS, SolveMode};
+use crate::arbiter::{Contact, ContactData, HIDDEN, ONE_NORMAL, SLOTS, SolveMode};
 use crate::math::{Pose, Real, Rotation, Vec3};
 use crate::narrow_phase::{Manifold, ManifoldPoint, WideManifold};
 use crate::simd::{LanePose, LaneRotation, LaneVec3, Lanes, Number, Quad};
@@ -214,7 +214,7 @@ pub(super) fn update_contacts(data: &mut ContactData, places: &Places, rotations
         one_normal &= place.normal == points[0].normal;
     }
     data.usage_mask = data.usage_mask & 0xf0 | used;
-    data.flags = data.flags & !ONE_NORMAL | if one_normal { ONE_NORMAL } else { 0 };
+    data.flags = data.flags & !(ONE_NORMAL | HIDDEN) | if one_normal { ONE_NORMAL } else { 0 };
 }
 
 /// The slot of the contact that each point goes on from, or [`SLOTS`].

@@ -12,6 +12,7 @@
 
 mod block;
 mod contacts;
+mod seams;
 
 use super::World;
 use super::arbiters::{fresh_data, mix_shape_materials};
@@ -32,6 +33,7 @@ use crate::solver::{BodyMass, SolverBodies};
 use crate::storage;
 use block::{BlockKernel, PAIRS_PER_BLOCK, WORDS_PER_BLOCK};
 use contacts::{Places, update_contacts};
+use seams::SeamSearch;
 use std::marker::PhantomData;
 
 /// How many begins ahead of its making the pair of an arbiter is asked for.
@@ -46,6 +48,8 @@ enum News {
     Sensor(u32, bool),
     /// The arbiter has no contacts.
     Empty(u32),
+    /// The body has new contacts with what nothing can push.
+    Borne(u32),
     /// The shapes ask to be told something of their arbiter, and whether they have one.
     Watched(u32, bool),
 }
@@ -86,6 +90,8 @@ pub(crate) struct NarrowPhaseScratch {
     begin_order: Vec<(ArbiterKey, u32)>,
     apart: Vec<u32>,
     sensors: Vec<(u32, bool)>,
+    /// Bodies with new contacts against what nothing can push.
+    borne: Vec<u32>,
     /// Arbiters that may have nothing left.
     pub empty: Vec<u32>,
 }
@@ -121,6 +127,7 @@ impl World {
                 News::Apart(pair) => scratch.apart.push(pair),
                 News::Sensor(pair, overlaps) => scratch.sensors.push((pair, overlaps)),
                 News::Empty(arbiter) => scratch.empty.push(arbiter),
+                News::Borne(body) => scratch.borne.push(body),
                 News::Watched(pair, goes_on) => self.events.watch(pair, goes_on),
             }
         }
@@ -135,6 +142,7 @@ impl World {
         scratch.apart.clear();
         scratch.empty.retain(|&index| self.arbiters.at(index).alive);
         self.begin_pairs(scratch.begins.list(), &mut scratch.begin_order);
+        self.hide_seams(&mut scratch.borne);
         self.narrow = scratch;
     }
 
@@ -171,6 +179,23 @@ impl World {
                 lanes: PhantomData,
             });
         });
+    }
+
+    /// Leaves contacts at seams between shapes that nothing can push out of the solve.
+    fn hide_seams(&mut self, bodies: &mut Vec<u32>) {
+        bodies.sort_unstable();
+        bodies.dedup();
+        let search = SeamSearch {
+            shapes: &self.shapes,
+            bodies: &self.bodies,
+            solver: &self.solver_bodies,
+            lists: &self.pair_lists,
+            pairs: SharedSlice::new(&mut self.pairs),
+            arbiters: SharedSlice::new(self.arbiters.slots_mut()),
+            slop: self.scaled.slop,
+        };
+        search.run(bodies, &mut self.pool);
+        bodies.clear();
     }
 
     /// Makes the arbiters of the pairs that begin to touch, by key.

@@ -316,6 +316,21 @@ impl ImpactSearch<'_> {
         match geometry {
             Shape::Mesh(mesh) => self.mesh_impact(Surface::Mesh(mesh), mover),
             Shape::HeightField(field) => self.mesh_impact(Surface::Field(field), mover),
+            Shape::Compound(compound) => {
+                let mut first = None;
+                compound.for_each_child(&mover.around(2.0 * self.settings.slop), |_, child, pose| {
+                    first = earlier(first, self.impact_with(child, &mover.relative_to(&[*pose; 2])));
+                });
+                first
+            }
+            Shape::Voxels(grid) => {
+                let mut first = None;
+                grid.for_each_box(&mover.around(2.0 * self.settings.slop), |_, cuboid, center| {
+                    let seen = mover.relative_to(&[Pose::from_position(center); 2]);
+                    first = earlier(first, self.impact(&Support::Cuboid(cuboid), &seen));
+                });
+                first
+            }
             convex => Support::new(convex).and_then(|fixed| self.impact(&fixed, mover)),
         }
     }

@@ -37,6 +37,11 @@ impl<'a> Core<'a> {
                 let core = Cylinder::new(s.half_length() - thickness, s.radius() - thickness).ok()?;
                 centered(Support::Cylinder(core))
             }
+            // Of what is made of parts, the ball in the thickest of them.
+            Shape::Compound(_) | Shape::Voxels(_) => {
+                let ball = Support::Sphere(Sphere::new(thickness).ok()?);
+                Self { support: ball, shift: shape.inner_ball().0, middle: Vec3::ZERO }
+            }
             // A copy of half the size about the middle is inside by half the inner radius.
             other if thickness > 0.0 && Support::new(other).is_some() => {
                 let center = other.inner_ball().0;
@@ -104,7 +109,10 @@ impl<'a> Mover<'a> {
         let path = Sweep { start: start.mul(on_body), end: end.mul(on_body), pivot };
         let to_core = Pose::from_position(shift);
         let core_path = Sweep { start: path.start.mul(&to_core), end: path.end.mul(&to_core), pivot: pivot - shift };
-        let support = Support::new(&shape.geometry)?;
+        let (support, path) = match Support::new(&shape.geometry) {
+            Some(support) => (support, path),
+            None => (Support::Sphere(Sphere::new(2.0 * thickness).ok()?), core_path),
+        };
         let bulge = bulge(&core, &core_path);
         Some(Self { shape, slot, support, path, thickness, core, core_path, core_middle: middle, whole: false, bulge })
     }

@@ -1,0 +1,142 @@
+//! Seams: contacts with inner edges and faces of what is one surface to the eye.
+//!
+//! Two boxes side by side make a flat floor, but each of them has four side faces and twelve edges. What slides from one to
+//! the other overlaps the second by a hair along the way and by more in height: the least way out is back. That contact is
+//! real for the box alone, and none at all for the floor.
+//!
+//! Given a contact with A (its [`Patch`]) of something that also bears on the surface elsewhere ([`Bearing`]), with `m` the
+//! true normal of the surface where it bears, and `t` the part of the contact's normal `n` that is square to `m`: the contact
+//! is at a seam if, at each of its points `p`,
+//!
+//! - just across the seam, at `p + ε t`, the surface of all together is as high as `p` or higher, seen along `m`: `p` is on
+//!   it or under it;
+//! - on the way into A, at `p − L t` for three lengths `L`, the surface goes on, and is nowhere higher than across.
+//!
+//! A wall or a step rises inside A, a fence has points above the floor, behind the ridge of a roof the surface falls: none
+//! of these is a seam. A contact whose normal is as near to `m` as that of the bearing is no less true than it and never
+//! hidden, so of two contacts at most one goes. All is asked of the shapes by rays, so that it holds for boxes, hulls, meshes,
+//! compounds and voxels alike; nothing is remembered from step to step.
+
+use crate::math::{Real, Vec3, max, min, tangents};
+use crate::query::{Ray, ShapeHit};
+
+/// How far across the seam, and how much higher or lower counts as flat, in scales.
+const ACROSS: Real = 0.5;
+/// How far inside, in scales: near enough for thin fences, far enough for ramps.
+const INSIDE: [Real; 3] = [0.1, 1.0, 4.0];
+/// Where rays start over what they look for, in scales.
+const LIFT: Real = 4.0;
+/// What rises by more than this (a sine) from where something bears is no part of the same surface.
+const STEEP: Real = 0.4;
+/// How far beside a ray that falls into a crack others are cast, in scales.
+const BESIDE: Real = 0.01;
+/// Points are looked at nearer to their middle by this share: those at the border of two shapes behind belong to both.
+const INWARDS: Real = 0.02;
+/// A bearing has to lean less than this (its cosine) from the surface that it bears on.
+const BEARS: Real = 0.9;
+/// A contact that pushes into the surface by more than this (a sine) is never hidden.
+const PUSHES_IN: Real = 0.3;
+/// Normals are as near to the surface's if the squares of their distances differ by no more than this.
+const AS_NEAR: Real = 1e-8;
+
+/// Casts a ray at all of a surface.
+pub(crate) type Cast<'a> = &'a dyn Fn(&Ray) -> Option<ShapeHit>;
+
+/// The points of a contact with one normal.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Patch {
+    /// On the fixed shape.
+    pub points: [Vec3; 4],
+    pub count: usize,
+    /// Away from the fixed shape.
+    pub normal: Vec3,
+}
+
+/// A contact with another fixed shape that may carry what a hidden one would have carried.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Bearing {
+    /// Middle of its points on the fixed shape.
+    pub point: Vec3,
+    /// Away from the fixed shape.
+    pub normal: Vec3,
+}
+
+impl Patch {
+    /// Whether the contact is at a seam in a surface that there is a bearing on. `cast` casts rays at all of the surface, in
+    /// the frame of the points; `scale` is the length (metres) below which edges are none.
+    pub fn is_hidden_by(&self, bearing: &Bearing, cast: Cast<'_>, scale: Real) -> bool {
+        if self.is_no_seam(bearing, scale) {
+            return false;
+        }
+        let Some(m) = surface_normal(bearing, cast, scale) else { return false };
+        let off = |normal: Vec3| (normal - m).length_squared();
+        let along = self.normal.dot(m);
+        let across = self.normal - m * along;
+        let length = across.length();
+        if off(self.normal) <= off(bearing.normal) + AS_NEAR || along < -PUSHES_IN || length <= 0.0 {
+            return false;
+        }
+        let across = across * (1.0 / length);
+        let points = &self.points[..self.count];
+        let middle = self.middle();
+        let flat = ACROSS * scale;
+        points.iter().all(|&point| {
+            let point = point + (middle - point) * INWARDS;
+            let lift = LIFT * scale + max((bearing.point - point).dot(m), 0.0);
+            let Some(there) = height(cast, point + across * flat, m, (lift, flat)) else { return false };
+            INSIDE.iter().all(|&inside| {
+                let here = height(cast, point - across * (inside * scale), m, (lift, lift));
+                here.is_some_and(|here| here < lift && here <= there + flat)
+            })
+        })
+    }
+}
+
+impl Patch {
+    /// The middle of the points.
+    fn middle(&self) -> Vec3 {
+        self.points[..self.count].iter().fold(Vec3::ZERO, |sum, &point| sum + point) / self.count as Real
+    }
+
+    /// What this contact says of the surface that it is on.
+    pub fn bearing(&self) -> Bearing {
+        Bearing { point: self.middle(), normal: self.normal }
+    }
+
+    /// What shows without a ray that it is no seam: the same normal, or a point well above the surface that bears, as those
+    /// of a wall are.
+    fn is_no_seam(&self, bearing: &Bearing, scale: Real) -> bool {
+        let high = |point: &Vec3| {
+            let apart = *point - bearing.point;
+            let over = apart.dot(bearing.normal) - ACROSS * scale;
+            over > 0.0 && over * over > STEEP * STEEP * apart.length_squared()
+        };
+        (self.normal - bearing.normal).length_squared() <= AS_NEAR || self.points[..self.count].iter().any(high)
+    }
+}
+
+/// The normal of the surface that a bearing is on, if it bears on it.
+fn surface_normal(bearing: &Bearing, cast: Cast<'_>, scale: Real) -> Option<Vec3> {
+    let origin = bearing.point + bearing.normal * scale;
+    let ray = Ray { origin, direction: -bearing.normal, max_fraction: 2.0 * scale };
+    let mut hits = beside(&ray, scale).into_iter().filter_map(|ray| cast(&ray));
+    hits.find(|hit| hit.normal.dot(bearing.normal) > BEARS).map(|hit| hit.normal)
+}
+
+/// How high a surface is over a point, looked for from `lift` above it (there if it is even higher) to `depth` below.
+fn height(cast: Cast<'_>, point: Vec3, up: Vec3, (lift, depth): (Real, Real)) -> Option<Real> {
+    let ray = Ray { origin: point + up * lift, direction: -up, max_fraction: lift + depth };
+    beside(&ray, lift).iter().find_map(cast).map(|hit| lift - hit.fraction)
+}
+
+/// A ray and two beside it: rounding leaves cracks between shapes that only touch, and a ray can fall into one.
+fn beside(ray: &Ray, scale: Real) -> [Ray; 3] {
+    let (t1, t2) = tangents(ray.direction);
+    let by = (t1 * 0.8 + t2 * 0.6) * (BESIDE * scale);
+    [*ray, Ray { origin: ray.origin + by, ..*ray }, Ray { origin: ray.origin - by, ..*ray }]
+}
+
+/// The length below which edges are none: a share of the slop, and of the size of small shapes.
+pub(crate) fn scale_of(slop: Real, size: Real) -> Real {
+    if size > 0.0 { min(slop, 0.25 * size) } else { slop }
+}
