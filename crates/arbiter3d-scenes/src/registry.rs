@@ -276,6 +276,24 @@ pub static SCENES: &[Scene] = &[
         build: scenes::behaviour::t_handle,
     },
     Scene {
+        name: "vehicle_track",
+        description: "a car drives rounds on a track with humps and pushes crates out of its way",
+        size: Size::FIXED,
+        build: scenes::vehicles::vehicle_track,
+    },
+    Scene {
+        name: "buoyancy_pool",
+        description: "balls, boxes, capsules and rocks of 200 to 1,700 kg/m³ fall into a pool: the light ones float",
+        size: Size::new("bodies", 64, 100_000),
+        build: scenes::fluids::buoyancy_pool,
+    },
+    Scene {
+        name: "character_course",
+        description: "a character takes stairs, slopes, gaps, a lift, a turning disc, a low ceiling, a crate and a wedge",
+        size: Size::FIXED,
+        build: scenes::character::character_course,
+    },
+    Scene {
         name: "gears",
         description: "two gears, meshes of 12 and 24 teeth: the small one drives the large one",
         size: Size::FIXED,

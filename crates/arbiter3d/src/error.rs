@@ -126,6 +126,12 @@ pub enum Error {
         /// The body.
         id: BodyId,
     },
+    /// A vehicle on a body that forces do not move.
+    #[error("{id:?} is not dynamic: forces do not move it; make it dynamic first")]
+    NotDynamic {
+        /// The body.
+        id: BodyId,
+    },
     /// A mass or inertia that no matter can have.
     #[error("mass {mass} with this inertia cannot be: mass and principal moments must be finite and above zero")]
     BadMass {

@@ -24,6 +24,8 @@
 
 mod arbiter;
 mod broad_phase;
+mod buoyancy;
+mod character;
 mod edge_lists;
 mod error;
 #[cfg(doctest)]
@@ -39,9 +41,15 @@ mod shape;
 mod simd;
 mod solver;
 mod storage;
+mod vehicle;
 mod world;
 
 pub use arbiter::{Arbiter, ArbiterId, ArbiterKey, Contact, ContactData, ContactPoint, EndReason, SolveMode};
+pub use buoyancy::{FluidDefinition, FluidSurface, FluidVolume, Submersion};
+pub use character::{
+    CharacterController, CharacterSettings, ContactPlane, Ground, PlaneLimit, PlaneSolution, ShapeMover, SlideResult,
+    solve_planes,
+};
 pub use query::{Ray, ShapeCast, ShapeDistance, ShapeHit, cast_ray, distance, overlaps};
 pub use shape::{
     Capsule, Cone, ConvexHull, ConvexShape, Cuboid, Custom, Cylinder, FieldDiagonals, FieldSide, HalfEdge, HalfSpace,
@@ -49,6 +57,10 @@ pub use shape::{
     TaperedCapsule, Transformed, Triangle, TriangleMesh,
 };
 pub use simd::{SimdLevel, UnknownSimdLevel};
+pub use vehicle::{
+    AntiRollBar, Suspension, Tyre, Vehicle, VehicleControls, VehicleDefinition, WheelContact, WheelDefinition,
+    WheelState,
+};
 pub use world::{
     Anisotropy, BeginEvent, BeginListener, BodyDefinition, BodyId, BodyKind, BodyKinds, BodyMut, BodyRef, CastHit,
     CombineRule, ContactEvents, ContactFilter, ContactProvider, EndEvent, EndListener, Error, Filter, HitEvent,

@@ -6,12 +6,14 @@
 //! on NEON. The step rotates with [`Rotation`], whose formulas are spelled out on scalars.
 
 mod aabb;
+mod angles;
 mod pose;
 mod rotation;
 mod symmetric;
 
 pub use aabb::Aabb;
 pub(crate) use aabb::rotated_half_extents;
+pub(crate) use angles::{sin_cos, turn};
 pub use glam::{Mat3, Quat, Vec3};
 pub use pose::Pose;
 pub use rotation::Rotation;

@@ -685,6 +685,27 @@ impl World {
         (body.reach, body.extents) = (reach, extents);
     }
 
+    /// Adds a force that comes anew in every step, as a spring or a fluid gives it. Other than a push it does not keep the
+    /// body awake, and a body at rest takes none.
+    pub(crate) fn add_lasting_force(&mut self, id: BodyId, force: Vec3, torque: Vec3) -> Result<(), Error> {
+        let index = self.body_index(id)? as usize;
+        let body = &mut self.bodies[index];
+        if !body.awake || !body.is_dynamic() {
+            return Ok(());
+        }
+        let (sum, turning) = (body.force + force, body.torque + torque);
+        finite_vec("sum of the forces", sum)?;
+        finite_vec("sum of the torques", turning)?;
+        (body.force, body.torque) = (sum, turning);
+        Ok(())
+    }
+
+    /// Lists the awake bodies, in no particular order.
+    pub(crate) fn list_awake(&self, list: &mut Vec<BodyId>) {
+        list.clear();
+        list.extend(self.awake.iter().map(|&index| self.body_id(index)));
+    }
+
     /// Copies kind, mass and pose of a body into the solver's records.
     pub(crate) fn refresh_solver_body(&mut self, index: u32) {
         let body = &self.bodies[index as usize];

@@ -115,6 +115,11 @@ impl std::fmt::Debug for QueryFilter<'_> {
 
 impl World {
     /// Whether a query with this filter sees a shape.
+    pub(crate) fn filter_accepts(&self, filter: &QueryFilter<'_>, shape: ShapeId) -> bool {
+        self.shape_slot(shape).is_ok_and(|slot| self.sees(filter, slot))
+    }
+
+    /// Whether a query with this filter sees the shape in a slot.
     pub(super) fn sees(&self, filter: &QueryFilter<'_>, slot: u32) -> bool {
         let shape = &self.shapes[slot as usize];
         let body = self.body_id(shape.body);
