@@ -26,7 +26,7 @@ const GOLDEN: [(&str, u64); 8] = [
     ("bullets", 0x75d1_ec1d_6776_8a2b),
     ("custom contacts", 0xf4d2_df3a_d912_e6b7),
     ("coming and going", 0x61e5_ab28_4389_24db),
-    ("surfaces", 0x75da_f17e_e1a8_66ff),
+    ("surfaces", 0xfb4e_7233_74c0_4900),
     ("rods and bullets", 0x945b_21b6_158d_4406),
 ];
 
