@@ -37,14 +37,8 @@ pub(super) fn position_number(corner: Vec3) -> u32 {
 }
 
 impl Candidate {
-    const NONE: Self = Self {
-        position: Vec3::ZERO,
-        normal: Vec3::ZERO,
-        separation: 0.0,
-        feature: 0,
-        facet: NO_FACET,
-        triangle: 0,
-    };
+    const NONE: Self =
+        Self { position: Vec3::ZERO, normal: Vec3::ZERO, separation: 0.0, feature: 0, facet: NO_FACET, triangle: 0 };
 }
 
 /// Points that the buffer holds.
