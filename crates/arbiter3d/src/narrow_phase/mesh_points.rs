@@ -36,6 +36,11 @@ pub(super) fn position_number(corner: Vec3) -> u32 {
     (mixed.rotate_left(13) ^ z).wrapping_mul(0x2c1b_3c6d) ^ mixed >> 16
 }
 
+impl Candidate {
+    const NONE: Self =
+        Self { position: Vec3::ZERO, normal: Vec3::ZERO, separation: 0.0, feature: 0, facet: NO_FACET, triangle: 0 };
+}
+
 /// Points that the buffer holds.
 const CAPACITY: usize = 64;
 /// Groups kept when the buffer is full: six of nine points leave room for ten more.
@@ -78,10 +83,10 @@ struct Groups {
 }
 
 impl Candidates {
+    // Inlined, so that the list is made where it stays.
+    #[inline(always)]
     pub(super) fn new(tolerance: Real) -> Self {
-        let (position, normal) = (Vec3::ZERO, Vec3::ZERO);
-        let none = Candidate { position, normal, separation: 0.0, feature: 0, facet: NO_FACET, triangle: 0 };
-        Self { list: [none; CAPACITY], count: 0, tolerance, deepest: Real::MAX }
+        Self { list: [Candidate::NONE; CAPACITY], count: 0, tolerance, deepest: Real::MAX }
     }
 
     /// The least separation of all points that were added, also of those dropped since.

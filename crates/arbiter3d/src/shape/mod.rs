@@ -426,7 +426,7 @@ impl Shape {
     /// turned around where the map mirrors; other convex shapes become [`Transformed`] ones.
     ///
     /// # Errors
-    /// If a number is not finite, the map is (almost) flat, or the shape is a half-space.
+    /// If a number is not finite, the map is (almost) flat, or the shape is a half-space or a height field.
     pub fn transformed(&self, linear: Mat3, translation: Vec3) -> Result<Self, ShapeError> {
         transformed::inverse_of(linear, translation)?;
         let map = |point: Vec3| linear * point + translation;
