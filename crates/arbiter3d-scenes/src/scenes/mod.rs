@@ -4,6 +4,7 @@ pub(crate) mod behaviour;
 pub(crate) mod colosseum;
 pub(crate) mod drums;
 pub(crate) mod fields;
+pub(crate) mod parade;
 pub(crate) mod piles;
 pub(crate) mod stacks;
 pub(crate) mod trees;

@@ -25,10 +25,12 @@ mod mesh;
 mod mesh_points;
 mod penetration;
 mod polyhedron;
+mod revolved;
 mod sphere;
 mod support;
 mod time_of_impact;
 mod triangle;
+mod triangle_general;
 mod triangle_lanes;
 mod triangle_solid;
 
@@ -135,6 +137,7 @@ fn collide_sorted(
         (Shape::Hull(a), Shape::Hull(b)) => hull::collide(level, (a, &**b), pose, margin, (cache, manifold)),
         (Shape::Mesh(a), convex) if convex.is_convex() => mesh::collide(a, convex, pose, margin, manifold),
         (Shape::HalfSpace(_), other) => half_space::collide(other, pose, margin, manifold),
+        (revolved, Shape::Sphere(b)) if revolved::revolved_sphere(revolved, b, pose, margin, manifold) => {}
         _ => general::collide((shape1, shape2), pose, margin, manifold),
     }
 }
@@ -148,4 +151,8 @@ fn mirror(pose: &Pose, manifold: &mut Manifold) {
 }
 
 #[cfg(test)]
+mod oracle_tests;
+#[cfg(test)]
 mod tests;
+#[cfg(test)]
+pub(crate) use tests::Random;

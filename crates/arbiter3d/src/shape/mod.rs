@@ -35,6 +35,8 @@ mod triangle;
 
 pub use capsule::Capsule;
 pub use cone::Cone;
+#[cfg(test)]
+pub(crate) use convex::sphere_grid;
 pub(crate) use convex::{FEATURE_POINTS, FLAT_SINE, Feature};
 pub use cuboid::Cuboid;
 pub use custom::{ConvexShape, Custom};
