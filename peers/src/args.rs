@@ -2,13 +2,17 @@
 
 use crate::catalog::{Entry, entries};
 use crate::engine::Kind;
-use clap::Parser;
+use crate::queries::QueryArgs;
+use clap::{Parser, Subcommand};
 use std::path::PathBuf;
 
 /// Times arbiter3d and other physics engines side by side on the same scenes.
 #[derive(Debug, Parser)]
 #[command(version)]
 pub struct Args {
+    /// Something other than steps
+    #[command(subcommand)]
+    pub command: Option<Command>,
     /// Smaller scenes and fewer steps: minutes instead of hours
     #[arg(long)]
     pub quick: bool,
@@ -39,6 +43,13 @@ pub struct Args {
     /// Draws the results into a file as SVG
     #[arg(long, value_name = "FILE")]
     pub svg: Option<PathBuf>,
+}
+
+/// What else this program times.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Rays and shape casts a second
+    Queries(QueryArgs),
 }
 
 /// What is to be run.

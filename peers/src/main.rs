@@ -8,13 +8,14 @@ mod args;
 mod catalog;
 mod engine;
 mod memory;
+mod queries;
 mod report;
 mod ruler;
 mod run;
 mod scene;
 mod verdict;
 
-use args::{Args, Plan, Wrong, write};
+use args::{Args, Command, Plan, Wrong, write};
 use clap::Parser;
 use indicatif::{ProgressBar, ProgressStyle};
 use report::Row;
@@ -26,7 +27,11 @@ static ALLOCATOR: memory::Counting = memory::Counting;
 
 fn main() -> ExitCode {
     let args = Args::parse();
-    match compare(&args) {
+    let result = match &args.command {
+        Some(Command::Queries(queries)) => queries::compare(queries),
+        None => compare(&args),
+    };
+    match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(wrong) => {
             eprintln!("error: {wrong}");

@@ -7,7 +7,7 @@ use crate::replay::{
 };
 use crate::report::cannot_write;
 use arbiter3d::{
-    BodyId, ConvexHull, Shape, ShapeId, World,
+    BodyId, Shape, ShapeId, World,
     math::{Quat, Vec3},
 };
 use arbiter3d_scenes::BuiltScene;
@@ -116,8 +116,7 @@ impl Film {
         let name = (id == BodyId::WORLD).then(|| "world".to_owned());
         let body = self.recording.add_body(BodyInfo { kind, name });
         for shape in shapes.iter().filter_map(|&id| world.shape(id)) {
-            let Some(geometry) = geometry(shape.geometry()) else { continue };
-            let geometry = self.recording.add_geometry(geometry)?;
+            let geometry = self.recording.add_geometry(geometry(shape.geometry()))?;
             let (position, rotation) = (shape.position().to_array(), shape.rotation().to_array());
             self.recording.add_shape(ShapeInstance { body, geometry, position, rotation })?;
         }
@@ -151,30 +150,29 @@ impl Film {
     }
 }
 
-/// What the page draws for a shape; `None` for kinds it does not know.
-fn geometry(shape: &Shape) -> Option<Geometry> {
-    Some(match shape {
+/// Steps of the surfaces that the page draws for round shapes that it does not know.
+const DRAWN_STEPS: usize = 12;
+
+/// What the page draws for a shape.
+fn geometry(shape: &Shape) -> Geometry {
+    match shape {
         Shape::Sphere(sphere) => Geometry::Sphere { radius: sphere.radius() },
         Shape::Capsule(capsule) => Geometry::Capsule { half_length: capsule.half_length(), radius: capsule.radius() },
         Shape::Cuboid(cuboid) => Geometry::Cuboid { half_extents: cuboid.half_extents().to_array() },
-        Shape::Hull(hull) => Geometry::Hull { vertices: arrays(hull.vertices()), triangles: fans(hull) },
-        Shape::Mesh(mesh) => Geometry::Mesh { vertices: arrays(mesh.vertices()), triangles: mesh.triangles().to_vec() },
-        _ => return None,
-    })
+        other => {
+            let (vertices, triangles) = other.triangulate(DRAWN_STEPS);
+            let vertices = arrays(&vertices);
+            if other.is_convex() {
+                Geometry::Hull { vertices, triangles }
+            } else {
+                Geometry::Mesh { vertices, triangles }
+            }
+        }
+    }
 }
 
 fn arrays(points: &[Vec3]) -> Vec<[f32; 3]> {
     points.iter().map(|point| point.to_array()).collect()
-}
-
-/// The faces of a hull as fans of triangles.
-fn fans(hull: &ConvexHull) -> Vec<[u32; 3]> {
-    let mut triangles = Vec::new();
-    for face in 0..hull.planes().len() {
-        let corners: Vec<u32> = hull.face_vertices(face).map(|vertex| vertex as u32).collect();
-        triangles.extend(corners.windows(2).skip(1).map(|pair| [corners[0], pair[0], pair[1]]));
-    }
-    triangles
 }
 
 #[cfg(test)]
@@ -185,12 +183,34 @@ mod tests {
     fn a_cube_of_a_hull_is_drawn_with_twelve_triangles_facing_outward() {
         let corner = |i: u32| Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32) - Vec3::splat(0.5);
         let points: Vec<Vec3> = (0..8).map(corner).collect();
-        let hull = ConvexHull::new(&points).unwrap();
-        let triangles = fans(&hull);
+        let Geometry::Hull { vertices, triangles } = geometry(&Shape::hull(&points).unwrap()) else {
+            panic!("a hull is drawn as one");
+        };
         assert_eq!(triangles.len(), 12);
-        let at = |i: u32| hull.vertices()[i as usize];
-        let volume: f32 = triangles.iter().map(|t| at(t[0]).dot(at(t[1]).cross(at(t[2]))) / 6.0).sum();
-        assert!((volume - 1.0).abs() < 1e-5, "{volume}");
+        assert!((volume(&vertices, &triangles) - 1.0).abs() < 1e-5);
+    }
+
+    fn volume(vertices: &[[f32; 3]], triangles: &[[u32; 3]]) -> f32 {
+        let at = |i: u32| Vec3::from(vertices[i as usize]);
+        triangles.iter().map(|t| at(t[0]).dot(at(t[1]).cross(at(t[2]))) / 6.0).sum()
+    }
+
+    /// What the page has no drawing of its own for is drawn as a closed surface with nearly the shape's volume.
+    #[test]
+    fn every_convex_shape_is_drawn_with_its_volume() {
+        let cube = Shape::cuboid(Vec3::splat(0.4)).unwrap();
+        let shapes = [
+            Shape::cylinder(0.5, 0.3).unwrap(),
+            Shape::cone(0.5, 0.3).unwrap(),
+            Shape::tapered_capsule(0.4, 0.2, 0.3).unwrap(),
+            Shape::ellipsoid(Vec3::new(0.2, 0.4, 0.6)).unwrap(),
+            Shape::rounded(&cube, 0.1).unwrap(),
+        ];
+        for shape in shapes {
+            let Geometry::Hull { vertices, triangles } = geometry(&shape) else { panic!("{shape:?} is not drawn") };
+            let (drawn, true_volume) = (volume(&vertices, &triangles), shape.mass_properties(1.0).unwrap().mass);
+            assert!(drawn < true_volume && drawn > 0.96 * true_volume, "{shape:?}: {drawn}, not {true_volume}");
+        }
     }
 
     /// Bodies that appear in the middle of a run are in the page, and frames come at 60 a second at most.

@@ -246,6 +246,24 @@ pub static SCENES: &[Scene] = &[
         build: scenes::trees::trees25,
     },
     Scene {
+        name: "high_speed_room",
+        description: "5,000 bodies at 250 m/s in a closed room with elastic walls (Jolt)",
+        size: Size::new("bodies", 5000, 100_000),
+        build: scenes::fast::high_speed_room,
+    },
+    Scene {
+        name: "high_speed_bullets",
+        description: "the same with bullets, which hit each other too and lose no time",
+        size: Size::new("bodies", 5000, 100_000),
+        build: scenes::fast::high_speed_bullets,
+    },
+    Scene {
+        name: "spinning_rods",
+        description: "400 thin rods spin at 100 rad/s in a closed room with walls of 1 cm",
+        size: Size::new("rods", 400, 100_000),
+        build: scenes::fast::spinning_rods,
+    },
+    Scene {
         name: "ramps",
         description: "boxes with friction 0, 0.1, … 1 on a slope of 30°: those above 0.577 stick",
         size: Size::FIXED,
@@ -262,6 +280,18 @@ pub static SCENES: &[Scene] = &[
         description: "a T-shaped handle spins weightless and flips over 37 times in 20 s",
         size: Size::FIXED,
         build: scenes::behaviour::t_handle,
+    },
+    Scene {
+        name: "one_way_platforms",
+        description: "ten bodies are thrown up through one-way platforms and stand each on its floor; a lift passes and carries",
+        size: Size::new("columns", 10, 100_000),
+        build: scenes::surfaces::one_way_platforms,
+    },
+    Scene {
+        name: "conveyors",
+        description: "eight boxes go round on a ring of belts, and seven skids slide along themselves on a slope",
+        size: Size::FIXED,
+        build: scenes::surfaces::conveyors,
     },
 ];
 

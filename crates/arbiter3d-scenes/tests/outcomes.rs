@@ -168,3 +168,53 @@ fn the_shape_parade_comes_to_rest() {
     assert!(world.deepest_penetration() < 0.02, "{}", world.deepest_penetration());
     assert!(world.awake_count() <= 2, "{} are awake", world.awake_count());
 }
+
+/// What is thrown up through one-way platforms stands on the floor that it was thrown at, and the lift carries its
+/// load.
+#[test]
+fn bodies_stand_on_the_floors_that_they_passed() {
+    let mut scene = built("one_way_platforms");
+    run(&mut scene, 360);
+    let places = positions(&scene.world);
+    for (column, place) in places[..10].iter().enumerate() {
+        let top = 3.0 * (1 + column % 5) as f32;
+        // The least is that of a rock on its flattest side, 0.2 m, the most that of the capsule on its end, 0.7 m.
+        assert!((0.2..0.72).contains(&(place.y - top)), "column {column}: at {place}, floor at {top}");
+    }
+    // The lift was half a metre under the ground and rises at 1 m/s.
+    let carried = places[10].y - 0.4 - 0.1;
+    assert!((carried - (360.0 / 60.0 - 0.5)).abs() < 0.05, "the lift's load is at {carried}");
+}
+
+/// Boxes go round on the belts at nearly 2 m/s; skids slide along themselves by what gravity does there, and stick
+/// across.
+#[test]
+fn belts_carry_round_and_skids_slide_along_themselves() {
+    let mut scene = built("conveyors");
+    let start = positions(&scene.world);
+    run(&mut scene, 120);
+    for (index, (before, after)) in start[8..].iter().zip(&positions(&scene.world)[8..]).enumerate() {
+        let turned = (15.0 * index as f32).to_radians();
+        let (along, across) = (9.81 * 0.5 * turned.cos(), 9.81 * 0.5 * turned.sin());
+        // Friction across bears its part of gravity; of the friction along, the rest of the ellipse is left.
+        let limit = 9.81 * 0.8 * 0.75_f32.sqrt();
+        let acceleration = along - 0.1 * limit * (1.0 - (across / limit).powi(2)).sqrt();
+        let expected = 2.0 * acceleration.max(0.0);
+        let moved = (*after - *before).length();
+        assert!((moved - expected).abs() < 0.02 * expected + 0.01, "skid {index} moved {moved} m, not {expected} m");
+    }
+    let (mut way, mut last) = ([0.0; 8], positions(&scene.world));
+    for step in 120..600 {
+        scene.step(step).unwrap();
+        let now = positions(&scene.world);
+        for (index, way) in way.iter_mut().enumerate() {
+            let (place, out) = (now[index], now[index].x.abs().max(now[index].z.abs()));
+            assert!((place.y - 1.25).abs() < 0.1 && (2.9..5.1).contains(&out), "step {step}: box {index} at {place}");
+            *way += (place - last[index]).length();
+        }
+        last = now;
+    }
+    for (index, way) in way.iter().enumerate() {
+        assert!((13.0..16.1).contains(way), "box {index} has come {way} m in 8 s");
+    }
+}

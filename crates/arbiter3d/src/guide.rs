@@ -14,6 +14,8 @@ chapters! {
     GettingStarted: "docs/getting-started.md",
     BodiesAndShapes: "docs/bodies-and-shapes.md",
     Arbiters: "docs/arbiters.md",
+    CustomShapes: "docs/custom-shapes.md",
+    ContactsAndEvents: "docs/contacts-and-events.md",
     CustomCollision: "docs/custom-collision.md",
     Step: "docs/step.md",
     Sleeping: "docs/sleeping.md",

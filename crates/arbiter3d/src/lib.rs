@@ -42,7 +42,7 @@ mod storage;
 mod world;
 
 pub use arbiter::{Arbiter, ArbiterId, ArbiterKey, Contact, ContactData, ContactPoint, EndReason, SolveMode};
-pub use query::{Ray, ShapeHit, cast_ray};
+pub use query::{Ray, ShapeCast, ShapeDistance, ShapeHit, cast_ray, distance, overlaps};
 pub use shape::{
     Capsule, Cone, ConvexHull, ConvexShape, Cuboid, Custom, Cylinder, HalfEdge, HalfSpace, MassProperties, MeshRayHit,
     MeshSides, Plane, PointCloud, Rounded, Shape, ShapeError, Sphere, TaperedCapsule, Transformed, Triangle,
@@ -50,8 +50,9 @@ pub use shape::{
 };
 pub use simd::{SimdLevel, UnknownSimdLevel};
 pub use world::{
-    BeginEvent, BeginListener, BodyDefinition, BodyId, BodyKind, BodyMut, BodyRef, CombineRule, ContactFilter,
-    ContactProvider, EndEvent, EndListener, Error, Filter, LockedAxes, Material, PairFilter, Phase, QueryFilter,
-    RayHit, SensorEvent, ShapeDefinition, ShapeId, ShapeMut, ShapePair, ShapeRef, StepContext, StepReport, Timings,
-    UNIT_TOLERANCE, World, WorldSettings,
+    Anisotropy, BeginEvent, BeginListener, BodyDefinition, BodyId, BodyKind, BodyKinds, BodyMut, BodyRef, CastHit,
+    CombineRule, ContactEvents, ContactFilter, ContactProvider, EndEvent, EndListener, Error, Filter, HitEvent,
+    HitListener, Impact, LockedAxes, Material, PairFilter, PersistEvent, Phase, PointHit, PreSolveListener,
+    QueryFilter, RayHit, SensorEvent, ShapeContacts, ShapeDefinition, ShapeId, ShapeMut, ShapePair, ShapePredicate,
+    ShapeRef, StepContext, StepReport, Timings, UNIT_TOLERANCE, World, WorldSettings,
 };

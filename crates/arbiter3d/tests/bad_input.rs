@@ -264,7 +264,7 @@ fn bad_time_steps_are_refused() {
 #[test]
 fn bad_settings_are_refused() {
     type Change = fn(&mut WorldSettings, f32);
-    let fields: [(&str, Change); 10] = [
+    let fields: [(&str, Change); 11] = [
         ("gravity", |s, x| s.gravity.y = x),
         ("length_unit", |s, x| s.length_unit = x),
         ("slop", |s, x| s.slop = x),
@@ -273,6 +273,7 @@ fn bad_settings_are_refused() {
         ("contact_hertz", |s, x| s.contact_hertz = x),
         ("push_out_speed", |s, x| s.push_out_speed = x),
         ("restitution_threshold", |s, x| s.restitution_threshold = x),
+        ("hit_speed_threshold", |s, x| s.hit_speed_threshold = x),
         ("time_to_sleep", |s, x| s.time_to_sleep = x),
         ("sleep_speed", |s, x| s.sleep_speed = x),
     ];
@@ -321,7 +322,7 @@ fn stale_and_foreign_ids_are_errors() {
         );
     }
     for id in [shape, ShapeId::from_raw(0), ShapeId::from_raw(u64::MAX)] {
-        assert!(world.shape(id).is_none() && world.shape_mut(id).is_none() && world.sensor_overlaps(id).is_empty());
+        assert!(world.shape(id).is_none() && world.shape_mut(id).is_none() && world.sensor_visitors(id).is_empty());
         assert_eq!(refused(&mut world, "remove_shape", |w| w.remove_shape(id)), Error::UnknownShape { id });
     }
     for id in [arbiter, foreign_arbiter] {

@@ -2,8 +2,10 @@
 
 mod common;
 
-use arbiter3d::math::Vec3;
-use arbiter3d::{BodyDefinition, BodyId, MeshSides, Shape, ShapeDefinition, TriangleMesh, World};
+use arbiter3d::math::{Quat, Vec3};
+use arbiter3d::{
+    BodyDefinition, BodyId, LockedAxes, MeshSides, Shape, ShapeDefinition, TriangleMesh, World, WorldSettings,
+};
 use common::*;
 
 /// What stands in the way, across z, with its near side at z = 0.
@@ -181,4 +183,187 @@ fn bullets_pass_what_they_do_not_collide_with() {
     world.add_shape(BodyId::WORLD, &target(Target::Wall).filter(nothing)).unwrap();
     let shot = BodyDefinition::dynamic().at(Vec3::Z * -2.0).moving(Vec3::Z * 200.0, Vec3::ZERO);
     assert_relative(shoot(&mut world, &shot, &sphere(0.025)), -2.0 + 200.0 * 0.5, 1e-3, "way");
+}
+
+/// How a rod meets the wall.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Meeting {
+    /// Its centre is held beside the wall.
+    Pinned,
+    /// At 10 to 60 m/s.
+    Thrown,
+    /// It falls on it.
+    Dropped,
+}
+
+/// Rods of 2 m by 2 cm: a capsule, a box, the same as a hull, and a hull that is thin at one end.
+fn rods() -> [(&'static str, Shape); 4] {
+    let bar = |near: f32, far: f32| -> Vec<Vec3> {
+        let sides = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)];
+        let corner = |(x, z): (f32, f32)| [Vec3::new(x * near, -1.0, z * near), Vec3::new(x * far, 1.0, z * far)];
+        sides.into_iter().flat_map(corner).collect()
+    };
+    [
+        ("capsule", capsule(0.99, 0.01)),
+        ("box", cuboid(0.01, 1.0, 0.01)),
+        ("hull", Shape::hull(&bar(0.01, 0.01)).unwrap()),
+        ("taper", Shape::hull(&bar(0.02, 0.01)).unwrap()),
+    ]
+}
+
+/// A rod on this side of the wall: where, and how it is turned.
+fn beside_the_wall(random: &mut Random, meeting: Meeting) -> (Vec3, Quat) {
+    loop {
+        let far = if meeting == Meeting::Pinned { -0.98 } else { -2.5 };
+        let center = Vec3::new(random.range(-3.0, 3.0), random.range(-3.0, 3.0), random.range(far, -0.05));
+        let rotation = random.rotation();
+        let end = (rotation * Vec3::Y).z.abs();
+        if center.z + end < -0.04 {
+            return (center, rotation);
+        }
+    }
+}
+
+/// Rods that spin at `speed` beside, into and onto a wall of 1 cm and meshes: their centres stay on this side, and no point of
+/// their centre lines comes farther than `deepest` beyond the far side.
+fn spin_rods(speed: f32, rounds: usize, deepest: f32) {
+    let mut crossed = Vec::new();
+    for kind in [Target::Wall, Target::OneSidedMesh, Target::TwoSidedMesh] {
+        let far_side = if kind == Target::Wall { 0.01 } else { 0.0 };
+        for (meeting, (name, shape)) in [Meeting::Pinned, Meeting::Thrown, Meeting::Dropped]
+            .into_iter()
+            .flat_map(|meeting| rods().into_iter().map(move |rod| (meeting, rod)))
+        {
+            let mut world = weightless();
+            if meeting == Meeting::Dropped {
+                let settings =
+                    WorldSettings { gravity: Vec3::Z * 9.81, allow_sleep: false, ..WorldSettings::default() };
+                world = World::new(settings).unwrap();
+            }
+            world.add_shape(BodyId::WORLD, &target(kind)).unwrap();
+            let mut random = Random(70);
+            for round in 0..rounds {
+                let (center, rotation) = beside_the_wall(&mut random, meeting);
+                let throw = random.range(10.0, 60.0);
+                let velocity = if meeting == Meeting::Thrown { askew(&mut random, throw) } else { Vec3::ZERO };
+                let spin = random.vector(1.0).normalize() * speed;
+                let mut body = BodyDefinition::dynamic().at(center).rotated(rotation).moving(velocity, spin);
+                if meeting == Meeting::Pinned {
+                    body.locked_axes = LockedAxes::TRANSLATION;
+                }
+                let rod = add(&mut world, &body, &ShapeDefinition::new(shape.clone()));
+                for step in 0..60 {
+                    world.step(DT).unwrap();
+                    let seen = world.body(rod).unwrap();
+                    let end = (seen.rotation() * Vec3::Y).z.abs();
+                    let (middle, tip) = (seen.center_of_mass().z, seen.position().z + end);
+                    let at = format!("{kind:?}, {meeting:?} {name}, round {round}, step {step}");
+                    if middle >= far_side || tip >= far_side + deepest {
+                        crossed.push(format!("{at}: centre at z = {middle}, end at z = {tip}"));
+                        break;
+                    }
+                }
+                world.remove_body(rod).unwrap();
+            }
+        }
+    }
+    let first = &crossed[..crossed.len().min(20)];
+    assert!(crossed.is_empty(), "{} rods have crossed: {first:#?}", crossed.len());
+}
+
+/// At 100 rad/s: an end goes 1.7 m in a step.
+#[test]
+fn spinning_rods_never_cross() {
+    spin_rods(100.0, 12, 0.01);
+}
+
+/// At 340 rad/s a rod turns by 5.7 radians in a step: nearly all the way round.
+#[test]
+fn rods_that_nearly_turn_full_circle_in_a_step_never_cross() {
+    spin_rods(340.0, 4, 0.01);
+}
+
+/// The same in many more directions and phases.
+#[test]
+#[ignore = "a minute long"]
+fn spinning_rods_never_cross_in_any_direction() {
+    spin_rods(100.0, 300, 0.01);
+    spin_rods(60.0, 100, 0.01);
+    spin_rods(340.0, 100, 0.01);
+}
+
+/// Doors of 2 cm that stand, swing and come: bodies at 60 to 200 m/s never get behind them.
+#[test]
+fn fast_bodies_do_not_pass_kinematic_doors() {
+    let shapes = [sphere(0.05), cube(0.05), capsule(0.2, 0.03), wedge(0.06)];
+    let doors = [
+        (Vec3::ZERO, Vec3::ZERO),
+        (Vec3::Z * 10.0, Vec3::ZERO),
+        (Vec3::Z * -20.0, Vec3::ZERO),
+        (Vec3::X * 5.0, Vec3::ZERO),
+        (Vec3::ZERO, Vec3::Y * 3.0),
+    ];
+    for (at, (velocity, spin)) in doors.into_iter().enumerate() {
+        let mut random = Random(71);
+        for shot in 0..30 {
+            let mut world = weightless();
+            let door = BodyDefinition::kinematic().moving(velocity, spin);
+            let door = add(&mut world, &door, &ShapeDefinition::new(cuboid(6.0, 6.0, 0.01)));
+            let from = Vec3::new(random.range(-1.0, 1.0), random.range(-1.0, 1.0), random.range(-4.0, -2.0));
+            let ahead = Vec3::Z * random.range(60.0, 200.0);
+            let body = BodyDefinition::dynamic().at(from).moving(ahead, random.vector(20.0));
+            let body = add(&mut world, &body, &ShapeDefinition::new(shapes[shot % 4].clone()));
+            for step in 0..8 {
+                world.step(DT).unwrap();
+                let seen = world.body(door).unwrap().pose().inverse_transform_point(position(&world, body));
+                assert!(seen.z < 0.0, "door {at}, shot {shot}, step {step}: {seen}");
+            }
+        }
+    }
+}
+
+/// A pair filter that lets a body pass a wall is heard by continuous collision.
+#[test]
+fn pair_filters_are_heard() {
+    let mut world = weightless();
+    world.add_shape(BodyId::WORLD, &target(Target::Wall)).unwrap();
+    world.set_pair_filter(Some(Box::new(|_| false)));
+    let body = BodyDefinition::dynamic().at(Vec3::Z * -2.0).moving(Vec3::Z * 200.0, Vec3::ZERO);
+    assert!(shoot(&mut world, &body, &sphere(0.05)) > 50.0);
+}
+
+/// At 50 m/s over a floor and a mesh, spinning about the vertical at 40 rad/s: nothing is held, lifted or shaken.
+#[test]
+fn spinning_bodies_slide_on_without_being_held() {
+    let ground = [
+        ShapeDefinition::new(cuboid(200.0, 200.0, 1.0)).at(Vec3::Z),
+        target(Target::OneSidedMesh),
+        target(Target::TwoSidedMesh),
+    ];
+    let bodies =
+        [(cuboid(0.5, 0.1, 0.1), 0.1), (Shape::hull(&corners(0.5, 0.1)).unwrap(), 0.1), (cuboid(0.3, 0.3, 0.05), 0.05)];
+    for (kind, below) in ground.into_iter().enumerate() {
+        for (at, &(ref shape, half)) in bodies.iter().enumerate() {
+            let half: f32 = half;
+            let settings = WorldSettings { gravity: Vec3::Z * 9.81, ..WorldSettings::default() };
+            let mut world = World::new(settings).unwrap();
+            world.add_shape(BodyId::WORLD, &below.clone().friction(0.0)).unwrap();
+            let body = BodyDefinition::dynamic().at(Vec3::new(-60.0, 0.3, -half));
+            let body = body.moving(Vec3::X * 50.0, Vec3::Z * 40.0);
+            let body = add(&mut world, &body, &ShapeDefinition::new(shape.clone()).friction(0.0));
+            run(&mut world, 2.0);
+            let seen = world.body(body).unwrap();
+            let what = format!("ground {kind}, body {at}");
+            assert_relative(seen.position().x, 40.0, 0.01, &what);
+            assert_relative(seen.linear_velocity().x, 50.0, 0.005, &what);
+            assert_relative(seen.angular_velocity().z, 40.0, 0.01, &what);
+            assert_near(seen.position().z, -half, 0.006, &what);
+        }
+    }
+}
+
+/// Corners of a bar along x.
+fn corners(long: f32, half: f32) -> Vec<Vec3> {
+    let side = |i: u32, bit: u32, half: f32| if i >> bit & 1 == 1 { half } else { -half };
+    (0..8).map(|i| Vec3::new(side(i, 0, long), side(i, 1, half), side(i, 2, half))).collect()
 }

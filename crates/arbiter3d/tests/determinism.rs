@@ -1,4 +1,4 @@
-//! The same bits for any number of threads and any SIMD level: six scenes against checked-in hashes.
+//! The same bits for any number of threads and any SIMD level: eight scenes against checked-in hashes.
 //!
 //! The state hash is taken after each tenth step and folded into one number a scene. After a change that is meant to alter
 //! results, print the new table with
@@ -13,19 +13,22 @@ mod common;
 
 use arbiter3d::math::Vec3;
 use arbiter3d::{
-    ArbiterKey, BodyDefinition, BodyId, BodyKind, ContactPoint, ContactProvider, LockedAxes, Shape, ShapeDefinition,
-    SimdLevel, StepContext, World, WorldSettings,
+    ArbiterKey, BodyDefinition, BodyId, BodyKind, ContactEvents, ContactPoint, ContactProvider, LockedAxes, Shape,
+    ShapeDefinition, SimdLevel, StepContext, World, WorldSettings,
 };
 use common::*;
 
 /// The hashes of the scenes, in their order.
-const GOLDEN: [(&str, u64); 6] = [
-    ("pile", 0xaac7_fc32_c6dd_5cd4),
+const GOLDEN: [(&str, u64); 9] = [
+    ("pile", 0x7e9c_c0ad_5a70_2769),
     ("hulls", 0x7d4f_1a72_0999_6ad2),
-    ("mesh rain", 0xbbc5_9568_a34d_b749),
-    ("bullets", 0x2095_d005_d124_c013),
-    ("custom contacts", 0xf4d2_df3a_d912_e6b7),
-    ("coming and going", 0x8fe6_cf19_2475_ff5b),
+    ("mesh rain", 0xb2c8_6c48_1dec_e272),
+    ("bullets", 0x9f41_d97b_8d7d_9482),
+    ("custom contacts", 0x770f_f93e_d37a_7820),
+    ("coming and going", 0x1a53_e1fa_507d_28ab),
+    ("surfaces", 0x99f9_afcf_6eba_408a),
+    ("rods and bullets", 0x09fd_da73_6a9a_6e4e),
+    ("mixed convex", 0x8633_67e6_2396_4c38),
 ];
 
 /// A scene: how it begins, and what is done before each step.
@@ -36,13 +39,16 @@ struct Scene {
     before_step: fn(&mut World, usize),
 }
 
-const SCENES: [Scene; 6] = [
+const SCENES: [Scene; 9] = [
     Scene { name: "pile", steps: 180, build: pile, before_step: |_, _| {} },
     Scene { name: "hulls", steps: 150, build: hulls, before_step: |_, _| {} },
     Scene { name: "mesh rain", steps: 180, build: mesh_rain, before_step: |_, _| {} },
     Scene { name: "bullets", steps: 120, build: bullets, before_step: shoot },
     Scene { name: "custom contacts", steps: 180, build: custom_contacts, before_step: |_, _| {} },
     Scene { name: "coming and going", steps: 300, build: coming_and_going, before_step: come_and_go },
+    Scene { name: "surfaces", steps: 180, build: surfaces, before_step: ask_for_surfaces },
+    Scene { name: "rods and bullets", steps: 120, build: rods_and_bullets, before_step: |_, _| {} },
+    Scene { name: "mixed convex", steps: 180, build: mixed_convex, before_step: |_, _| {} },
 ];
 
 /// Bodies of all shapes on a lattice over the origin, each turned and moving at random.
@@ -188,6 +194,106 @@ fn come_and_go(world: &mut World, step: usize) {
     add(world, &body, &ShapeDefinition::new(random.shape()));
 }
 
+/// Spinning rods, bullets of all shapes, resting crates and a door that swings, in a room with thin elastic walls.
+fn rods_and_bullets(world: &mut World) {
+    for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
+        for side in [-1.0, 1.0] {
+            let wall = Shape::cuboid(Vec3::splat(6.0) - axis * 5.99).unwrap();
+            let wall = ShapeDefinition::new(wall).at(axis * side * 6.0 + Vec3::Y * 6.0);
+            world.add_shape(BodyId::WORLD, &wall.restitution(0.9)).unwrap();
+        }
+    }
+    let door = BodyDefinition::kinematic().at(Vec3::Y * 3.0).moving(Vec3::ZERO, Vec3::Y * 4.0);
+    add(world, &door, &ShapeDefinition::new(cuboid(2.0, 2.0, 0.02)));
+    let mut random = Random(47);
+    let rods = [capsule(0.6, 0.01), cuboid(0.01, 0.6, 0.01), Shape::hull(&bar(0.6)).unwrap()];
+    for at in 0..60 {
+        let body = BodyDefinition::dynamic().at(Vec3::Y * 6.0 + random.vector(4.5)).rotated(random.rotation());
+        let (speed, spin) = [(10.0, 60.0), (150.0, 20.0), (0.0, 0.0)][at % 3];
+        let body = BodyDefinition { bullet: at % 3 == 1, ..body.moving(random.vector(speed), random.vector(spin)) };
+        let shape = if at % 3 == 0 { rods[at / 3 % 3].clone() } else { random.shape() };
+        add(world, &body, &ShapeDefinition::new(shape).restitution(0.5));
+    }
+}
+
+/// Corners of a bar along y.
+fn bar(half: f32) -> Vec<Vec3> {
+    let side = |i: u32, bit: u32, half: f32| if i >> bit & 1 == 1 { half } else { -half };
+    (0..8).map(|i| Vec3::new(side(i, 0, 0.01), side(i, 1, half), side(i, 2, 0.01))).collect()
+}
+
+/// Bodies of all shapes, some with easy friction one way, are thrown up through one-way platforms, of which one moves,
+/// and fall on belts, of which one turns. Hooks make ice of every third contact.
+fn surfaces(world: &mut World) {
+    let belt = ShapeDefinition::new(cuboid(6.0, 1.0, 12.0)).friction(0.8);
+    let fixed = BodyDefinition::fixed().at(Vec3::new(-6.0, -1.0, 0.0));
+    add(world, &fixed, &belt.clone().tangent_velocity(Vec3::X * 2.0));
+    let turning = BodyDefinition::kinematic().at(Vec3::new(6.0, -1.0, 0.0)).moving(Vec3::ZERO, Vec3::Y * 0.3);
+    add(world, &turning, &belt.tangent_velocity(Vec3::Z * -1.5));
+    let platform = ShapeDefinition::new(cuboid(5.0, 0.1, 5.0)).one_way(Vec3::Y);
+    add(world, &BodyDefinition::fixed().at(Vec3::Y * 2.5), &platform);
+    add(world, &BodyDefinition::kinematic().at(Vec3::Y * 4.0).moving(Vec3::Y * -0.5, Vec3::ZERO), &platform);
+    let gate = BodyDefinition::fixed().at(Vec3::Y * 2.0);
+    add(world, &gate, &ShapeDefinition::new(cuboid(3.0, 1.0, 3.0)).sensor());
+    let mut random = Random(47);
+    for at in 0..200 {
+        let place = Vec3::new((at % 10) as f32 - 4.5, (at / 100) as f32 + 0.7, (at / 10 % 10) as f32 - 4.5) * 1.05;
+        let body = BodyDefinition::dynamic().at(place).rotated(random.rotation());
+        let body = body.moving(random.vector(2.0) + Vec3::Y * 9.0, random.vector(3.0));
+        let shape = ShapeDefinition::new(random.shape()).restitution(0.2);
+        let shape = if at % 2 == 0 { shape.anisotropy(Vec3::X, 0.1) } else { shape };
+        let events = if at % 3 == 0 { ContactEvents::ALL } else { ContactEvents::NONE };
+        add(world, &body, &shape.events(events));
+    }
+    world.on_pre_solve(Box::new(|context, id| {
+        if let Some(arbiter) = context.arbiter_mut(id) {
+            arbiter.data_mut().set_friction(0.05).unwrap();
+        }
+    }));
+}
+
+/// The hits of a step push bodies in the next one: the order and numbers of the events are part of the hash.
+fn ask_for_surfaces(world: &mut World, _: usize) {
+    let hits: Vec<(BodyId, f32)> = world.hit_events().iter().map(|hit| (hit.body2, hit.impulse)).collect();
+    for (body, impulse) in hits {
+        let _ = world.body_mut(body).unwrap().apply_impulse(Vec3::new(0.1, 0.0, -0.1) * impulse);
+    }
+}
+
+/// Kinds known by their support, with boxes and balls among them, half on hills and half on a level floor.
+fn mixed_convex(world: &mut World) {
+    floor(world, 0.6);
+    let corner = |i: u32, j: u32| {
+        Vec3::new(i as f32 * 2.0 - 9.0, if (i + j).is_multiple_of(2) { 0.4 } else { 0.05 }, j as f32 * 2.0)
+    };
+    let vertices = (0..60).map(|at| corner(at % 10, at / 10)).collect();
+    let cell = |at: u32| at / 9 * 10 + at % 9;
+    let hills = (0..45).flat_map(|at| {
+        let c = cell(at);
+        [[c, c + 10, c + 1], [c + 1, c + 10, c + 11]]
+    });
+    let hills = Shape::mesh(vertices, hills.collect()).unwrap();
+    world.add_shape(BodyId::WORLD, &ShapeDefinition::new(hills)).unwrap();
+    let mut random = Random(47);
+    let block = cuboid(0.3, 0.2, 0.25);
+    let shapes = [
+        Shape::cylinder(0.3, 0.25).unwrap(),
+        Shape::cone(0.35, 0.3).unwrap(),
+        Shape::tapered_capsule(0.3, 0.15, 0.25).unwrap(),
+        Shape::ellipsoid(Vec3::new(0.4, 0.25, 0.3)).unwrap(),
+        Shape::rounded(&block, 0.05).unwrap(),
+        Shape::point_cloud(&[Vec3::X, Vec3::Y, Vec3::Z, -Vec3::ONE].map(|p| p * 0.4)).unwrap(),
+        block,
+        sphere(0.3),
+    ];
+    for at in 0..160 {
+        let place = Vec3::new((at % 8) as f32 - 3.5, (at / 64) as f32 + 1.0, (at / 8 % 8) as f32 - 3.5) * 1.1;
+        let body = BodyDefinition::dynamic().at(place).rotated(random.rotation());
+        let body = body.moving(random.vector(1.0), random.vector(3.0));
+        add(world, &body, &ShapeDefinition::new(shapes[at % 8].clone()));
+    }
+}
+
 fn settings(threads: usize, simd: SimdLevel) -> WorldSettings {
     WorldSettings { threads, simd: Some(simd), ..WorldSettings::default() }
 }
@@ -288,10 +394,28 @@ fn golden_coming_and_going() {
     check(5);
 }
 
+/// One-way platforms, belts, friction that differs along a direction, hooks and hits.
+#[test]
+fn golden_surfaces() {
+    check(6);
+}
+
+/// Rods that spin, bullets and a door.
+#[test]
+fn golden_rods_and_bullets() {
+    check(7);
+}
+
+/// Cylinders, cones and other shapes known by their support, on a floor and on a mesh.
+#[test]
+fn golden_mixed_convex() {
+    check(8);
+}
+
 /// The scenes do what they are for: they have contacts, sleepers and motion.
 #[test]
 fn the_scenes_are_worth_hashing() {
-    for (scene, contacts) in SCENES.iter().zip([500, 300, 400, 50, 150, 100]) {
+    for (scene, contacts) in SCENES.iter().zip([500, 300, 400, 50, 150, 100, 150, 5, 150]) {
         let mut world = World::new(settings(1, SimdLevel::best())).unwrap();
         let hashes = play(&mut world, scene);
         let found = world.contact_count();

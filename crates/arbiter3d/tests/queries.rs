@@ -1,17 +1,37 @@
-//! Rays and boxes against brute force.
+//! Queries against brute force.
 
 mod common;
 
+#[path = "queries/batch.rs"]
+mod batch;
+#[path = "queries/casts.rs"]
+mod casts;
+#[path = "queries/nearest.rs"]
+mod nearest;
+#[path = "queries/watertight.rs"]
+mod watertight;
+
 use arbiter3d::math::{Aabb, Vec3};
 use arbiter3d::{
-    BodyDefinition, BodyId, Filter, QueryFilter, Ray, RayHit, Shape, ShapeDefinition, ShapeId, World, cast_ray,
+    BodyDefinition, BodyId, Filter, MeshSides, QueryFilter, Ray, RayHit, Shape, ShapeDefinition, ShapeId, TriangleMesh,
+    World, cast_ray,
 };
 use common::*;
+use std::sync::Arc;
 
 /// 300 bodies of all shapes strewn about, some static, and a piece of mesh.
 fn strewn(random: &mut Random) -> World {
+    strewn_with(random, MeshSides::One, 300)
+}
+
+/// The same with a mesh that is solid on both sides.
+fn strewn_two_sided(random: &mut Random) -> World {
+    strewn_with(random, MeshSides::Two, 300)
+}
+
+fn strewn_with(random: &mut Random, sides: MeshSides, count: usize) -> World {
     let mut world = weightless();
-    for at in 0..300 {
+    for at in 0..count {
         let place = Vec3::new(random.range(-10.0, 10.0), random.range(-10.0, 10.0), random.range(-10.0, 10.0));
         let body = if at % 3 == 0 { BodyDefinition::fixed() } else { BodyDefinition::dynamic() };
         let shape =
@@ -22,8 +42,8 @@ fn strewn(random: &mut Random) -> World {
     }
     let sheet =
         [Vec3::new(-9.0, 0.0, -9.0), Vec3::new(9.0, 1.0, -9.0), Vec3::new(9.0, 0.0, 9.0), Vec3::new(-9.0, -1.0, 9.0)];
-    let mesh = Shape::mesh(sheet.to_vec(), vec![[0, 2, 1], [0, 3, 2]]).unwrap();
-    world.add_shape(BodyId::WORLD, &ShapeDefinition::new(mesh)).unwrap();
+    let mesh = TriangleMesh::with_sides(sheet.to_vec(), vec![[0, 2, 1], [0, 3, 2]], sides).unwrap();
+    world.add_shape(BodyId::WORLD, &ShapeDefinition::new(Shape::Mesh(Arc::new(mesh)))).unwrap();
     world
 }
 
@@ -60,7 +80,7 @@ fn brute_force(world: &World, origin: Vec3, direction: Vec3, limit: f32, filter:
     hits
 }
 
-fn filters(world: &World) -> [QueryFilter; 5] {
+fn filters(world: &World) -> [QueryFilter<'_>; 5] {
     let all = QueryFilter::default();
     let body = world.bodies().nth(5).unwrap();
     let shape = world.body(world.bodies().nth(8).unwrap()).unwrap().shapes()[0];

@@ -1,10 +1,11 @@
 //! arbiter3d, through its public interface.
 
-use super::{Engine, State};
+use super::{Ask, Engine, State};
 use crate::memory;
+use crate::queries::{BALL, BOX, tilt};
 use crate::scene::{Body, Scene};
-use arbiter3d::math::{Real, Vec3};
-use arbiter3d::{BodyId, Shape, World, WorldSettings};
+use arbiter3d::math::{Pose, Real, Rotation, Vec3};
+use arbiter3d::{BodyId, QueryFilter, Shape, ShapeCast, World, WorldSettings};
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -13,6 +14,8 @@ pub struct Arbiter {
     world: World,
     bodies: Vec<BodyId>,
     copies: Copies,
+    /// The ball and the box that are cast.
+    probes: [Shape; 2],
 }
 
 impl Arbiter {
@@ -20,7 +23,10 @@ impl Arbiter {
     pub fn new(scene: &Scene, threads: usize) -> Result<Self, String> {
         let settings = WorldSettings { threads, simd: None, ..scene.settings };
         let world = World::new(settings).map_err(|error| error.to_string())?;
-        let mut engine = Self { world, bodies: Vec::with_capacity(scene.bodies.len()), copies: Copies::default() };
+        let probes = [Shape::sphere(BALL), Shape::cuboid(BOX)].map(|shape| shape.map_err(|error| error.to_string()));
+        let [ball, cuboid] = probes;
+        let bodies = Vec::with_capacity(scene.bodies.len());
+        let mut engine = Self { world, bodies, copies: Copies::default(), probes: [ball?, cuboid?] };
         scene.bodies.iter().try_for_each(|body| engine.spawn(body))?;
         Ok(engine)
     }
@@ -151,5 +157,23 @@ mod tests {
             assert!((a - b).length() < 1e-4, "step {step}: {a} and {b}");
             assert!(step < 20 || a.z < -1.0, "step {step}: {a} has hardly moved");
         });
+    }
+}
+
+impl Ask for Arbiter {
+    fn ray(&self, origin: Vec3, way: Vec3) -> Option<Real> {
+        self.world.cast_ray(origin, way, 1.0, &QueryFilter::default()).ok()?.map(|hit| hit.fraction)
+    }
+
+    fn ball(&self, origin: Vec3, way: Vec3) -> Option<Real> {
+        let start = Pose::from_position(origin);
+        let cast = ShapeCast::along(&self.probes[0], start, way);
+        self.world.cast_shape(&cast, &QueryFilter::default()).ok()?.map(|hit| hit.fraction)
+    }
+
+    fn cuboid(&self, origin: Vec3, way: Vec3) -> Option<Real> {
+        let start = Pose::new(origin, Rotation::from_quat(tilt()));
+        let cast = ShapeCast::along(&self.probes[1], start, way);
+        self.world.cast_shape(&cast, &QueryFilter::default()).ok()?.map(|hit| hit.fraction)
     }
 }

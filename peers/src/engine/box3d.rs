@@ -2,13 +2,14 @@
 //!
 //! Boxes are its box hulls, hulls are shared by its own database, a mesh is built once and outlives the world.
 
-use super::{Engine, State, beyond_peers, rolling_resistance};
+use super::{Ask, Engine, State, beyond_peers, rolling_resistance};
+use crate::queries::{BALL, BOX, tilt};
 use crate::scene::{Body, Scene};
 use arbiter3d::math::{Quat, Real, Rotation, Vec3};
 use arbiter3d::{BodyKind, CombineRule, ConvexHull, LockedAxes, Shape, ShapeDefinition, TriangleMesh, WorldSettings};
 use boxddd_sys::ffi;
 use std::collections::HashMap;
-use std::ffi::{CStr, c_char};
+use std::ffi::{CStr, c_char, c_int, c_void};
 use std::ptr::null_mut;
 use std::sync::Arc;
 
@@ -290,5 +291,56 @@ impl Drop for Box3d {
             self.hulls.values().for_each(|&hull| ffi::b3DestroyHull(hull));
             self.meshes.values().for_each(|&mesh| ffi::b3DestroyMesh(mesh));
         }
+    }
+}
+
+/// Keeps the least fraction, and clips the cast there.
+unsafe extern "C" fn keep_closest(
+    _: ffi::b3ShapeId,
+    _: ffi::b3Pos,
+    _: ffi::b3Vec3,
+    fraction: f32,
+    _: u64,
+    _: c_int,
+    _: c_int,
+    context: *mut c_void,
+) -> f32 {
+    // SAFETY: `cast` hands over a pointer to such an option, which lives during the call.
+    unsafe { *context.cast::<Option<f32>>() = Some(fraction) };
+    fraction
+}
+
+impl Box3d {
+    fn cast(&self, origin: Vec3, way: Vec3, points: &[ffi::b3Vec3], radius: f32) -> Option<Real> {
+        let proxy = ffi::b3ShapeProxy { points: points.as_ptr(), count: points.len() as c_int, radius };
+        let mut closest: Option<f32> = None;
+        let context = (&raw mut closest).cast::<c_void>();
+        // SAFETY: the world lives; the proxy and the context outlive the call.
+        unsafe {
+            let filter = ffi::b3DefaultQueryFilter();
+            ffi::b3World_CastShape(self.world, vec(origin), &proxy, vec(way), filter, Some(keep_closest), context);
+        }
+        closest
+    }
+}
+
+impl Ask for Box3d {
+    fn ray(&self, origin: Vec3, way: Vec3) -> Option<Real> {
+        // SAFETY: the world lives.
+        let result =
+            unsafe { ffi::b3World_CastRayClosest(self.world, vec(origin), vec(way), ffi::b3DefaultQueryFilter()) };
+        result.hit.then_some(result.fraction)
+    }
+
+    fn ball(&self, origin: Vec3, way: Vec3) -> Option<Real> {
+        self.cast(origin, way, &[vec(Vec3::ZERO)], BALL)
+    }
+
+    fn cuboid(&self, origin: Vec3, way: Vec3) -> Option<Real> {
+        let rotation = Rotation::from_quat(tilt());
+        let (x, y, z) =
+            (rotation.rotate(Vec3::X * BOX.x), rotation.rotate(Vec3::Y * BOX.y), rotation.rotate(Vec3::Z * BOX.z));
+        let corners = [x + y + z, x + y - z, x - y + z, x - y - z, y + z - x, y - x - z, z - x - y, -x - y - z];
+        self.cast(origin, way, &corners.map(vec), 0.0)
     }
 }

@@ -93,6 +93,31 @@ pub trait Engine {
     }
 }
 
+/// A world that can be asked for the closest hit: the share of the way, from 0 to 1.
+pub trait Ask {
+    /// Of a ray.
+    fn ray(&self, origin: Vec3, way: Vec3) -> Option<Real>;
+    /// Of a moving ball of radius [`BALL`](crate::queries::BALL).
+    fn ball(&self, origin: Vec3, way: Vec3) -> Option<Real>;
+    /// Of a moving box of half extents [`BOX`](crate::queries::BOX), turned by [`tilt`](crate::queries::tilt).
+    fn cuboid(&self, origin: Vec3, way: Vec3) -> Option<Real>;
+}
+
+/// A fresh world of an engine to ask, stepped once so that it is ready; `None` where this program cannot ask the engine.
+pub fn ask(kind: Kind, scene: &Scene) -> Option<Box<dyn Ask>> {
+    fn ready<E: Engine + Ask + 'static>(engine: Result<E, String>, scene: &Scene) -> Option<Box<dyn Ask>> {
+        let mut engine = engine.ok()?;
+        engine.step(scene.dt).ok()?;
+        Some(Box::new(engine))
+    }
+    match kind {
+        Kind::Arbiter => ready(arbiter::Arbiter::new(scene, 1), scene),
+        Kind::Box3d => ready(box3d::Box3d::new(scene, 1), scene),
+        Kind::Rapier => ready(rapier::Rapier::new(scene, 1), scene),
+        Kind::Jolt => None,
+    }
+}
+
 /// Why an engine cannot express a scene, if it cannot.
 pub fn unsupported(kind: Kind, scene: &Scene) -> Option<String> {
     scene.all_bodies().find_map(|body| match kind {

@@ -1,10 +1,12 @@
 //! Rapier, through its public interface, on a thread pool of its own.
 
-use super::{Engine, State, beyond_peers};
+use super::{Ask, Engine, State, beyond_peers};
 use crate::memory;
+use crate::queries::{BALL, BOX, tilt};
 use crate::scene::{Body, Scene};
 use arbiter3d::math::{Quat, Real, Vec3};
 use arbiter3d::{BodyKind, CombineRule, Shape, ShapeDefinition, WorldSettings};
+use rapier3d::parry::query::ShapeCastOptions;
 use rapier3d::prelude::*;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -218,5 +220,40 @@ impl Engine for Rapier {
 
     fn bytes(&self) -> Option<isize> {
         Some(memory::held())
+    }
+}
+
+impl Rapier {
+    fn pipeline(&self) -> QueryPipeline<'_> {
+        self.world.broad_phase.as_query_pipeline(
+            self.world.narrow_phase.query_dispatcher(),
+            &self.world.bodies,
+            &self.world.colliders,
+            QueryFilter::default(),
+        )
+    }
+
+    fn cast(&self, start: &Pose, way: Vec3, shape: &dyn rapier3d::parry::shape::Shape) -> Option<Real> {
+        let options = ShapeCastOptions {
+            max_time_of_impact: 1.0,
+            compute_impact_geometry_on_penetration: false,
+            ..ShapeCastOptions::default()
+        };
+        self.pipeline().cast_shape(start, vec(way), shape, options).map(|(_, hit)| hit.time_of_impact)
+    }
+}
+
+impl Ask for Rapier {
+    fn ray(&self, origin: Vec3, way: Vec3) -> Option<Real> {
+        let ray = Ray::new(vec(origin), vec(way));
+        self.pipeline().cast_ray_and_get_normal(&ray, 1.0, true).map(|(_, hit)| hit.time_of_impact)
+    }
+
+    fn ball(&self, origin: Vec3, way: Vec3) -> Option<Real> {
+        self.cast(&pose(origin, Quat::IDENTITY), way, &Ball::new(BALL))
+    }
+
+    fn cuboid(&self, origin: Vec3, way: Vec3) -> Option<Real> {
+        self.cast(&pose(origin, tilt()), way, &Cuboid::new(vec(BOX)))
     }
 }

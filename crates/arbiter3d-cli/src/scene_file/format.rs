@@ -92,6 +92,8 @@ pub(crate) struct WorldSpec {
     pub push_out_speed: Option<Number>,
     /// Approach speed below which nothing bounces, m/s. Default 1.
     pub restitution_threshold: Option<Number>,
+    /// Approach speed from which on a contact is a hit, m/s. Default 1.
+    pub hit_speed_threshold: Option<Number>,
     /// Speed limit of bodies, m/s. Default 1000.
     pub max_linear_speed: Option<Number>,
     /// Whether resting islands may fall asleep. Default true.
@@ -220,7 +222,7 @@ pub(crate) enum AxisSpec {
     RotationZ,
 }
 
-/// A shape on a body: exactly one of `sphere`, `capsule`, `cuboid`, `hull` and `mesh`, and how it sits there.
+/// A shape on a body: exactly one geometry (`sphere`, `capsule`, …, `mesh`), and how it sits there.
 #[derive(Debug, Default, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
@@ -233,8 +235,26 @@ pub(crate) struct ShapeSpec {
     pub cuboid: Option<CuboidSpec>,
     /// The convex hull of some points.
     pub hull: Option<HullSpec>,
-    /// Name of a mesh in `meshes`; for static and kinematic bodies.
+    /// A cylinder along the y axis.
+    pub cylinder: Option<CylinderSpec>,
+    /// A cone along the y axis, its tip up.
+    pub cone: Option<CylinderSpec>,
+    /// The convex hull of two balls on the y axis.
+    pub tapered_capsule: Option<TaperedCapsuleSpec>,
+    /// An ellipsoid about the origin.
+    pub ellipsoid: Option<EllipsoidSpec>,
+    /// Everything below the origin; for static and kinematic bodies. Written as `{}`.
+    pub half_space: Option<HalfSpaceSpec>,
+    /// A single triangle, solid on both sides.
+    pub triangle: Option<TriangleSpec>,
+    /// The shrink-wrap of points, which may be flat.
+    pub point_cloud: Option<HullSpec>,
+    /// Name of a mesh in `meshes`.
     pub mesh: Option<String>,
+    /// Grows a convex geometry by a radius on all sides, metres. Default: not.
+    pub rounding: Option<Number>,
+    /// Multiplies the geometry along its axes, before `rounding`; negative numbers mirror. Default [1, 1, 1].
+    pub scale: Option<Triple>,
     /// Where the shape's frame sits on the body, metres. Default [0, 0, 0].
     pub position: Option<Triple>,
     /// Unit quaternion [x, y, z, w]. Default [0, 0, 0, 1]. Either this or `turn`.
@@ -251,6 +271,8 @@ pub(crate) struct ShapeSpec {
     pub rolling_resistance: Option<Number>,
     /// Velocity of the surface in the body's frame, m/s: a conveyor belt. Default [0, 0, 0].
     pub tangent_velocity: Option<Triple>,
+    /// Friction that differs along a direction: skis, tracks. Default none.
+    pub anisotropy: Option<AnisotropySpec>,
     /// How the frictions of two shapes make one. Default "maximum".
     pub friction_combine: Option<CombineSpec>,
     /// How the restitutions of two shapes make one. Default "maximum".
@@ -259,6 +281,19 @@ pub(crate) struct ShapeSpec {
     pub filter: Option<FilterSpec>,
     /// Whether it only reports what overlaps it and pushes nothing. Default false.
     pub sensor: bool,
+    /// The way in which bodies pass through it, a unit vector in its frame. Default none: nothing passes.
+    pub one_way: Option<Triple>,
+}
+
+/// Friction that differs along a direction.
+#[derive(Debug, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub(crate) struct AnisotropySpec {
+    /// Unit vector in the shape's frame.
+    pub direction: Triple,
+    /// Friction along it as a share of that across, 0.001 to 1000.
+    pub ratio: Number,
 }
 
 /// A ball.
@@ -297,6 +332,54 @@ pub(crate) struct CuboidSpec {
 pub(crate) struct HullSpec {
     /// At least four points that are not flat, metres; at most 255 of them on the hull.
     pub points: Vec<Triple>,
+}
+
+/// A cylinder or a cone.
+#[derive(Debug, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub(crate) struct CylinderSpec {
+    /// From the middle to each end, metres.
+    pub half_length: Number,
+    /// Of the cylinder, or of the cone's base, metres.
+    pub radius: Number,
+}
+
+/// Two balls and all that is between them.
+#[derive(Debug, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub(crate) struct TaperedCapsuleSpec {
+    /// From the middle to the centre of each ball, metres.
+    pub half_length: Number,
+    /// Of the upper ball, metres.
+    pub top_radius: Number,
+    /// Of the lower ball, metres.
+    pub bottom_radius: Number,
+}
+
+/// An ellipsoid.
+#[derive(Debug, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub(crate) struct EllipsoidSpec {
+    /// Half the size along each axis, metres.
+    pub half_axes: Triple,
+}
+
+/// An endless floor; it has no numbers.
+#[derive(Debug, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub(crate) struct HalfSpaceSpec {}
+
+/// A triangle.
+#[derive(Debug, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub(crate) struct TriangleSpec {
+    /// Its corners, metres.
+    pub corners: [Triple; 3],
 }
 
 /// How two numbers make one.

@@ -1,12 +1,14 @@
 //! Fills a world from a scene file.
 
 use super::format::{
-    AxisSpec, BodySpec, CombineSpec, GridSpec, KindSpec, Number, SceneFile, ShapeSpec, Triple, Turn, WorldSpec,
+    AxisSpec, BodySpec, CombineSpec, GridSpec, HullSpec, KindSpec, Number, SceneFile, ShapeSpec, Triple, Turn,
+    WorldSpec,
 };
 use super::{obj, parse};
 use crate::problem::{Place, Problem};
 use arbiter3d::{
-    BodyDefinition, BodyKind, CombineRule, Filter, LockedAxes, Material, Shape, ShapeDefinition, World, WorldSettings,
+    Anisotropy, BodyDefinition, BodyKind, CombineRule, Filter, LockedAxes, Material, Shape, ShapeDefinition, World,
+    WorldSettings,
     math::{Quat, Real, Vec3},
 };
 use arbiter3d_scenes::{BuiltScene, Random, SceneOptions, turns};
@@ -81,6 +83,7 @@ fn world(spec: &WorldSpec, options: &SceneOptions) -> Result<World, Complaint> {
         contact_damping_ratio: number(spec.contact_damping_ratio, default.contact_damping_ratio),
         push_out_speed: number(spec.push_out_speed, default.push_out_speed),
         restitution_threshold: number(spec.restitution_threshold, default.restitution_threshold),
+        hit_speed_threshold: number(spec.hit_speed_threshold, default.hit_speed_threshold),
         max_linear_speed: number(spec.max_linear_speed, default.max_linear_speed),
         allow_sleep: spec.allow_sleep.unwrap_or(default.allow_sleep),
         time_to_sleep: number(spec.time_to_sleep, default.time_to_sleep),
@@ -245,34 +248,53 @@ fn shape_definition(spec: &ShapeSpec, meshes: &Meshes, path: &str) -> Result<Sha
             restitution: number(spec.restitution, default.restitution),
             rolling_resistance: number(spec.rolling_resistance, default.rolling_resistance),
             tangent_velocity: spec.tangent_velocity.map_or(default.tangent_velocity, vector),
+            anisotropy: spec.anisotropy.as_ref().map(|it| Anisotropy::new(vector(it.direction), it.ratio.0)),
             friction_combine: combine_rule(spec.friction_combine, default.friction_combine),
             restitution_combine: combine_rule(spec.restitution_combine, default.restitution_combine),
         },
         filter,
         sensor: spec.sensor,
+        one_way: spec.one_way.map(vector),
         ..ShapeDefinition::new(geometry(spec, meshes, path)?)
     })
 }
 
-/// The one geometry that a shape is given.
+/// The one geometry that a shape is given, scaled and rounded.
 fn geometry(spec: &ShapeSpec, meshes: &Meshes, path: &str) -> Result<Shape, Complaint> {
+    let mut shape = plain_geometry(spec, meshes, path)?;
+    let complain = |name: &str, error: arbiter3d::ShapeError| (format!("{path}.{name}"), error.to_string());
+    if let Some(scale) = spec.scale {
+        shape = shape.scaled(vector(scale)).map_err(|error| complain("scale", error))?;
+    }
+    if let Some(Number(radius)) = spec.rounding {
+        shape = Shape::rounded(&shape, radius).map_err(|error| complain("rounding", error))?;
+    }
+    Ok(shape)
+}
+
+/// The one geometry that a shape is given, as it is.
+fn plain_geometry(spec: &ShapeSpec, meshes: &Meshes, path: &str) -> Result<Shape, Complaint> {
     let mut found: Vec<(&str, Result<Shape, String>)> = Vec::new();
-    let mut add = |name, shape: Result<Shape, arbiter3d::ShapeError>| {
-        found.push((name, shape.map_err(|error| error.to_string())));
+    let mut add = |name, shape: Option<Result<Shape, arbiter3d::ShapeError>>| {
+        found.extend(shape.map(|shape| (name, shape.map_err(|error| error.to_string()))));
     };
-    if let Some(sphere) = &spec.sphere {
-        add("sphere", Shape::sphere(sphere.radius.0));
-    }
-    if let Some(capsule) = &spec.capsule {
-        add("capsule", Shape::capsule(capsule.half_length.0, capsule.radius.0));
-    }
-    if let Some(cuboid) = &spec.cuboid {
-        add("cuboid", Shape::cuboid(vector(cuboid.half_extents)));
-    }
-    if let Some(hull) = &spec.hull {
-        let points: Vec<Vec3> = hull.points.iter().copied().map(vector).collect();
-        add("hull", Shape::hull(&points));
-    }
+    let points = |hull: &HullSpec| hull.points.iter().copied().map(vector).collect::<Vec<Vec3>>();
+    add("sphere", spec.sphere.as_ref().map(|s| Shape::sphere(s.radius.0)));
+    add("capsule", spec.capsule.as_ref().map(|s| Shape::capsule(s.half_length.0, s.radius.0)));
+    add("cuboid", spec.cuboid.as_ref().map(|s| Shape::cuboid(vector(s.half_extents))));
+    add("hull", spec.hull.as_ref().map(|s| Shape::hull(&points(s))));
+    add("cylinder", spec.cylinder.as_ref().map(|s| Shape::cylinder(s.half_length.0, s.radius.0)));
+    add("cone", spec.cone.as_ref().map(|s| Shape::cone(s.half_length.0, s.radius.0)));
+    add(
+        "tapered_capsule",
+        spec.tapered_capsule
+            .as_ref()
+            .map(|s| Shape::tapered_capsule(s.half_length.0, s.top_radius.0, s.bottom_radius.0)),
+    );
+    add("ellipsoid", spec.ellipsoid.as_ref().map(|s| Shape::ellipsoid(vector(s.half_axes))));
+    add("half_space", spec.half_space.as_ref().map(|_| Ok(Shape::half_space())));
+    add("triangle", spec.triangle.as_ref().map(|s| Shape::triangle(s.corners.map(vector))));
+    add("point_cloud", spec.point_cloud.as_ref().map(|s| Shape::point_cloud(&points(s))));
     if let Some(name) = &spec.mesh {
         let known = || meshes.keys().map(|name| format!("{name:?}")).collect::<Vec<_>>().join(", ");
         let missing = || format!("there is no mesh {name:?} in \"meshes\", which has: {}", known());
@@ -284,8 +306,9 @@ fn geometry(spec: &ShapeSpec, meshes: &Meshes, path: &str) -> Result<Shape, Comp
             shape.map_err(|message| (format!("{path}.{name}"), message))
         }
         count => {
-            let message =
-                format!("a shape is exactly one of sphere, capsule, cuboid, hull and mesh, this one is {count}");
+            let message = format!(
+                "a shape has exactly one geometry (sphere, capsule, cuboid, hull, … or mesh), this one has {count}"
+            );
             Err((path.to_owned(), message))
         }
     }
@@ -398,6 +421,21 @@ mod tests {
     }
 
     #[test]
+    fn surfaces_are_given_to_their_shapes() {
+        let world = built(
+            r#"{"world": {"hit_speed_threshold": 2.5}, "bodies": [{"shapes": [{"sphere": {"radius": 1},
+                "one_way": [0, 1, 0], "tangent_velocity": [2, 0, 0],
+                "anisotropy": {"direction": [0, 0, 1], "ratio": 0.25}}]}]}"#,
+        )
+        .unwrap();
+        assert_eq!(world.settings().hit_speed_threshold, 2.5);
+        let body = world.bodies().nth(1).unwrap();
+        let shape = world.shape(world.body(body).unwrap().shapes()[0]).unwrap();
+        assert_eq!((shape.one_way(), shape.material().tangent_velocity), (Some(Vec3::Y), Vec3::X * 2.0));
+        assert_eq!(shape.material().anisotropy, Some(Anisotropy::new(Vec3::Z, 0.25)));
+    }
+
+    #[test]
     fn what_the_engine_refuses_is_named_by_its_path() {
         let ball = r#""shapes": [{"sphere": {"radius": 1}}]"#;
         let cases = [
@@ -416,6 +454,17 @@ mod tests {
                 r#"{"bodies": [{"shapes": [{"sphere": {"radius": 1}, "restitution": 2}]}]}"#.to_owned(),
                 "bodies[0].shapes[0]",
                 "restitution is 2",
+            ),
+            (
+                r#"{"bodies": [{"shapes": [{"sphere": {"radius": 1}, "one_way": [0, 2, 0]}]}]}"#.to_owned(),
+                "bodies[0].shapes[0]",
+                "one_way",
+            ),
+            (
+                r#"{"bodies": [{"shapes": [{"sphere": {"radius": 1}, "anisotropy": {"direction": [1, 0, 0], "ratio": 0}}]}]}"#
+                    .to_owned(),
+                "bodies[0].shapes[0]",
+                "anisotropy ratio is 0",
             ),
             (r#"{"world": {"substeps": 0}}"#.to_owned(), "world", "substeps is 0"),
             (r#"{"hz": 0}"#.to_owned(), "hz", "0 steps a second"),

@@ -38,6 +38,8 @@ fn scenes_have_their_published_counts() {
         ("ramps", None, 11),
         ("bounce", None, 11),
         ("t_handle", None, 1),
+        ("one_way_platforms", None, 11),
+        ("conveyors", None, 15),
     ];
     for (name, size, count) in counts {
         assert_eq!(dynamic(&built(name, size).world).len(), count, "{name}");

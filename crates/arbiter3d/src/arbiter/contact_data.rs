@@ -150,6 +150,9 @@ pub struct ContactData {
     /// How the bodies were turned when the engine's contacts were made, or last turned along: see `world::collide`.
     pub(crate) rotations: [Rotation; 2],
     pub(crate) slots: [Contact; SLOTS],
+    /// Direction along which friction differs, world axes, and by how much: with [`ANISOTROPIC`] alone.
+    pub(crate) friction_direction: Vec3,
+    pub(crate) friction_ratio: Real,
 }
 
 /// The user has set the friction: materials no longer reach it.
@@ -162,6 +165,10 @@ pub(crate) const TANGENT_VELOCITY_OVERRIDDEN: u8 = 4;
 pub(crate) const ROLLING_OVERRIDDEN: u8 = 8;
 /// All contacts have the bit-equal normal and nothing removed: one row holds them all.
 pub(crate) const ONE_NORMAL: u8 = 16;
+/// Friction differs along a direction.
+pub(crate) const ANISOTROPIC: u8 = 32;
+/// The user has set that direction, or that there is none.
+pub(crate) const ANISOTROPY_OVERRIDDEN: u8 = 64;
 
 impl ContactData {
     quad_view! {
@@ -268,6 +275,37 @@ impl ContactData {
         self.solve_mode = mode;
     }
 
+    /// The direction (unit vector, world axes) along which friction is a share of [`ContactData::friction`], and that
+    /// share.
+    #[must_use]
+    pub fn anisotropy(&self) -> Option<(Vec3, Real)> {
+        (self.flags & ANISOTROPIC != 0).then_some((self.friction_direction, self.friction_ratio))
+    }
+
+    /// Sets, for the arbiter's life, a direction (unit vector, world axes) along which friction is `ratio` times what
+    /// it is across; `None` makes it the same in all directions. The direction stands still: to have it turn with a
+    /// body, set it before each solve, or use [`Material::anisotropy`](crate::Material::anisotropy).
+    ///
+    /// # Errors
+    /// If the direction is not finite and of unit length, or the ratio not from 0.001 to 1000.
+    pub fn set_anisotropy(&mut self, anisotropy: Option<(Vec3, Real)>) -> Result<(), Error> {
+        let valid = |(direction, ratio)| {
+            let direction = error::unit_vec("anisotropy direction", direction)?;
+            Ok::<_, Error>((direction, error::in_range("anisotropy ratio", ratio, 1e-3, 1e3)?))
+        };
+        self.put_anisotropy(anisotropy.map(valid).transpose()?);
+        self.flags |= ANISOTROPY_OVERRIDDEN;
+        Ok(())
+    }
+
+    pub(crate) fn put_anisotropy(&mut self, anisotropy: Option<(Vec3, Real)>) {
+        self.flags &= !ANISOTROPIC;
+        if let Some((direction, ratio)) = anisotropy {
+            (self.friction_direction, self.friction_ratio) = (direction, ratio);
+            self.flags |= ANISOTROPIC;
+        }
+    }
+
     /// Turns the normal of a contact; it points from body 1 to body 2, world axes.
     ///
     /// # Errors
@@ -303,7 +341,7 @@ impl ContactData {
         self.usage_mask = 0;
     }
 
-    fn slot_mut(&mut self, slot: usize) -> Result<&mut Contact, Error> {
+    pub(crate) fn slot_mut(&mut self, slot: usize) -> Result<&mut Contact, Error> {
         if slot < SLOTS && self.usage_mask >> slot & 1 == 1 {
             Ok(&mut self.slots[slot])
         } else {

@@ -310,14 +310,49 @@ impl BroadPhase {
     }
 
     /// Calls `visit` with each shape whose fat box the ray meets, static ones first; see [`DynamicTree::ray`].
+    #[inline]
     pub fn ray(&self, origin: Vec3, direction: Vec3, max_fraction: Real, mut visit: impl FnMut(u32, Real) -> Real) {
-        let mut limit = max_fraction;
+        self.each_tree(max_fraction, |tree, limit| {
+            tree.ray(origin, direction, *limit, |shape, present| {
+                *limit = crate::math::min(visit(shape, present), present);
+                *limit
+            });
+        });
+    }
+
+    /// Calls `visit` with each shape whose fat box a moving box meets, static ones first; see [`DynamicTree::cast`].
+    pub fn cast(
+        &self,
+        (origin, half): (Vec3, Vec3),
+        direction: Vec3,
+        max_fraction: Real,
+        mut visit: impl FnMut(u32, Real) -> Real,
+    ) {
+        self.each_tree(max_fraction, |tree, limit| {
+            tree.cast((origin, half), direction, *limit, |shape, present| {
+                *limit = crate::math::min(visit(shape, present), present);
+                *limit
+            });
+        });
+    }
+
+    /// Calls `visit` with each shape whose fat box is near, static ones first; see [`DynamicTree::nearest`].
+    pub fn nearest(&self, aabb: &Aabb, limit: Real, mut visit: impl FnMut(u32, Real) -> Real) {
+        self.each_tree(limit, |tree, limit| {
+            tree.nearest(aabb, *limit, |shape, present| {
+                *limit = crate::math::min(visit(shape, present), present);
+                *limit
+            });
+        });
+    }
+
+    /// Searches both trees, the second with the limit that the first has left, unless that is negative.
+    #[inline(always)]
+    fn each_tree(&self, limit: Real, mut search: impl FnMut(&DynamicTree, &mut Real)) {
+        let mut limit = limit;
         for tree in [&self.fixed, &self.moving] {
             if limit >= 0.0 {
-                tree.ray(origin, direction, limit, |shape, present| {
-                    limit = crate::math::min(visit(shape, present), present);
-                    limit
-                });
+                search(tree, &mut limit);
             }
         }
     }

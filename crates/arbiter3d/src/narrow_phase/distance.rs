@@ -16,8 +16,15 @@ use super::support::Support;
 use crate::math::{Pose, Real, Vec3};
 use glam::{DMat3, DVec3};
 
+mod linear_cast;
+
+pub(crate) use linear_cast::{Cast, CastPoint, linear_cast};
+
 /// Cores closer than this share of their size overlap: beyond it the direction is rounding.
 const TOUCHING: f64 = 1e-9;
+/// A tetrahedron is flat where a corner is over the opposite face at a smaller sine than this: corners of boxes and prisms often
+/// lie on one plane but for rounding.
+const FLAT: f64 = 1e-10;
 /// The search ends when a new extreme point gains less than this share of the distance.
 const GAIN: f64 = 1e-12;
 /// Round cores come closer by ever less: the direction is good to a hundred thousandth then.
@@ -264,6 +271,15 @@ impl Simplex {
         combine(&self.corners.map(|c| c.difference), feature).length_squared()
     }
 
+    /// Keeps the corners of the feature closest to the origin; false if that is inside.
+    fn reduce(&mut self) -> bool {
+        let feature = self.nearest_feature();
+        if let Some(feature) = &feature {
+            self.keep(feature);
+        }
+        feature.is_some()
+    }
+
     /// Drops the corners that are not part of a feature and takes over its weights.
     fn keep(&mut self, &(indices, weights, count): &Feature) {
         let corners = self.corners;
@@ -313,9 +329,11 @@ fn closest_on_tetrahedron(p: &[DVec3; 4]) -> Option<Feature> {
     let mut shortest = f64::MAX;
     for [a, b, c, opposite] in faces {
         let n = (p[b] - p[a]).cross(p[c] - p[a]);
-        let (inside, origin) = (n.dot(p[opposite] - p[a]), -n.dot(p[a]));
-        // The origin is beyond this face, or the tetrahedron is flat and all its faces count.
-        if inside == 0.0 || (inside > 0.0) != (origin > 0.0) {
+        let (up, inside) = (p[opposite] - p[a], n.dot(p[opposite] - p[a]));
+        let origin = -n.dot(p[a]);
+        // The origin is beyond this face, or the tetrahedron is flat (then the sign is rounding) and all its faces count.
+        let is_flat = inside * inside <= FLAT * FLAT * n.length_squared() * up.length_squared();
+        if is_flat || (inside > 0.0) != (origin > 0.0) {
             let feature = closest_on_triangle(p, [a, b, c]);
             let squared = combine(p, &feature).length_squared();
             if squared < shortest {

@@ -96,6 +96,9 @@ impl Touch {
             let low = figure1.height(p.x, p.y);
             let separation = figure2.height(p.x, p.y) - low;
             if separation <= margin && separation.is_finite() {
+                // Nothing is deeper along the normal than the closest point, but planes through corners that are not quite
+                // level may say so.
+                let separation = max(separation, self.separation);
                 let position = Vec3::new(p.x, p.y, low);
                 corners[kept] = ClipPoint { position, separation, feature: corners[k].feature };
                 kept += 1;
@@ -271,8 +274,8 @@ impl Figure {
     fn clip_face(&self, other: &Self, out: &mut [ClipPoint; CLIPPED]) -> usize {
         let mut buffer = [ClipPoint::default(); CLIPPED];
         let (mut front, mut back) = (out, &mut buffer);
-        for k in 0..other.count {
-            front[k] = ClipPoint { position: other.corners[k], separation: 0.0, feature: (k as u32 + 1) << 12 };
+        for (k, (corner, place)) in other.corners[..other.count].iter().zip(front.iter_mut()).enumerate() {
+            *place = ClipPoint { position: *corner, separation: 0.0, feature: (k as u32 + 1) << 12 };
         }
         let mut count = other.count;
         for k in 0..self.count {

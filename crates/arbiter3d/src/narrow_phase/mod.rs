@@ -35,7 +35,7 @@ mod triangle_lanes;
 mod triangle_solid;
 
 pub(crate) use cuboid::{CuboidLanes, CuboidPair, Near as NearCuboids, WideManifold};
-pub(crate) use distance::closest;
+pub(crate) use distance::{Cast, CastPoint, closest, linear_cast};
 pub(crate) use support::Support;
 pub(crate) use time_of_impact::{Sweep, gap, time_of_impact};
 

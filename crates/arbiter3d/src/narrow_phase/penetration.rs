@@ -18,9 +18,9 @@ use glam::DVec3;
 /// A face is on the boundary if the set reaches past it by less than this share of the size.
 const GAIN: f64 = 1e-7;
 /// Of round sets: by less than this share of the smaller shape's size, because the rest is polished.
-const ROUND_GAIN: f64 = 2e-5;
+const ROUND_GAIN: f64 = 1e-5;
 /// And this share of the depth.
-const ROUND_SHARE: f64 = 5e-4;
+const ROUND_SHARE: f64 = 5e-6;
 /// But no less than this share of the set's size.
 const ROUNDING: f64 = 1e-9;
 /// What is thinner than this share of its size is flat.
@@ -90,6 +90,8 @@ fn least_way_out(placed: &Placed<'_>) -> Option<Penetration> {
     let mut polytope = Polytope::new(first);
     let size = first.iter().fold(0.0, |size: f64, c| larger(c.difference.length_squared(), size)).sqrt();
     let round_gain = if placed.is_round() { ROUND_GAIN * placed.size() } else { 0.0 };
+    // The least depth seen, for a search that has to be given up.
+    let mut best = along(placed, placed.position().normalize_or(DVec3::Y));
     loop {
         let nearest = polytope.nearest_face()?;
         let face = polytope.faces[nearest];
@@ -100,8 +102,14 @@ fn least_way_out(placed: &Placed<'_>) -> Option<Penetration> {
         } else {
             GAIN * size
         };
-        if height - face.offset <= gain || !polytope.expand(nearest, reached) {
+        if height - face.offset <= gain {
             return Some(polytope.result(&face, height));
+        }
+        if height < best.depth {
+            best = Penetration { point1: reached.point1, normal: face.normal, depth: height };
+        }
+        if !polytope.expand(nearest, reached) {
+            return Some(best);
         }
     }
 }
@@ -246,7 +254,8 @@ impl Polytope {
         let (mut patch_count, mut grows) = (1, true);
         while grows {
             grows = false;
-            for k in patch_count..seeing {
+            let mut k = patch_count;
+            while k < seeing {
                 let corners = self.faces[patch[k] as usize].corners;
                 if outline.touches(corners) {
                     if !outline.cross(corners) {
@@ -256,6 +265,7 @@ impl Polytope {
                     patch_count += 1;
                     grows = true;
                 }
+                k += 1;
             }
         }
         if self.face_count - patch_count + outline.count > MAX_FACES {

@@ -27,6 +27,14 @@ pub(crate) enum Support<'a> {
     Rounded(&'a Rounded),
     Transformed(&'a Transformed),
     Custom(&'a Custom),
+    /// The hull of some points.
+    Points(&'a [Vec3]),
+    /// A smaller copy of a convex shape about a point inside.
+    Scaled {
+        shape: &'a Shape,
+        center: Vec3,
+        factor: Real,
+    },
 }
 
 impl<'a> Support<'a> {
@@ -57,6 +65,7 @@ impl<'a> Support<'a> {
             Self::Capsule(s) => s.radius(),
             Self::TaperedCapsule(s) => s.core_radius(),
             Self::Rounded(s) => s.radius() + Self::new(s.core()).map_or(0.0, |core| core.radius()),
+            Self::Scaled { shape, factor, .. } => Self::new(shape).map_or(0.0, |whole| whole.radius() * factor),
             _ => 0.0,
         }
     }
@@ -95,6 +104,12 @@ impl<'a> Support<'a> {
             Self::Rounded(s) => Self::new(s.core()).map_or(DVec3::ZERO, |core| core.core_support(direction)),
             Self::Transformed(s) => s.support(direction),
             Self::Custom(s) => s.support(direction),
+            Self::Points(points) => furthest(points, direction),
+            Self::Scaled { shape, center, factor } => {
+                let (center, factor) = (center.as_dvec3(), f64::from(*factor));
+                let whole = Self::new(shape).map_or(center, |whole| whole.core_support(direction));
+                center + (whole - center) * factor
+            }
         }
     }
 
@@ -112,7 +127,7 @@ impl<'a> Support<'a> {
             Self::Capsule(s) => s,
             Self::Cuboid(s) => s,
             Self::Hull(s) => *s,
-            Self::Triangle(_) => return None,
+            Self::Triangle(_) | Self::Points(_) | Self::Scaled { .. } => return None,
             Self::Cylinder(s) => s,
             Self::Cone(s) => s,
             Self::TaperedCapsule(s) => s,
@@ -131,6 +146,11 @@ impl<'a> Support<'a> {
             Self::Cuboid(s) => s.aabb(pose),
             Self::Hull(s) => s.local_aabb().transform(pose),
             Self::Triangle(corners) => Aabb::from_points(corners.map(|corner| pose.transform_point(corner))),
+            Self::Points(points) => Aabb::from_points(points.iter().map(|point| pose.transform_point(*point))),
+            Self::Scaled { shape, center, factor } => {
+                let (whole, center) = (shape.aabb(pose), pose.transform_point(*center));
+                Aabb::new(center + (whole.min - center) * *factor, center + (whole.max - center) * *factor)
+            }
             other => other.geometry().map_or(Aabb::EMPTY, |shape| shape.aabb(pose)),
         }
     }
@@ -144,6 +164,7 @@ impl<'a> Support<'a> {
             Self::Cuboid(s) => s.half_extents().dot(crate::math::abs3(direction)),
             Self::Hull(s) => longest(s.vertices()),
             Self::Triangle(corners) => longest(corners),
+            Self::Points(points) => longest(points),
             other => {
                 let d = direction.as_dvec3();
                 other.full_support(d).dot(d) as Real
@@ -161,15 +182,44 @@ impl<'a> Support<'a> {
             Self::Cuboid(s) => s.half_extents().length(),
             Self::Hull(s) => return longest(s.vertices()),
             Self::Triangle(corners) => return longest(corners),
+            Self::Points(points) => return longest(points),
+            Self::Scaled { shape, center, factor } => {
+                return shape.reach_from(*center) * factor + (*center - pivot).length();
+            }
             other => return other.geometry().map_or(0.0, |shape| shape.reach_from(pivot)),
         };
         around_origin + pivot.length()
+    }
+
+    /// Largest distance of a point of the core from the line through `pivot` along `axis`, a unit vector of the shape's
+    /// frame, metres: how fast the core's fastest point goes when it turns about that line. A log that rolls about its own
+    /// axis is slow, and the radius of what is round does not count at all. An upper bound for some kinds.
+    pub(crate) fn swing(&self, pivot: Vec3, axis: Vec3) -> Real {
+        let lever = |p: Vec3| (p - pivot).cross(axis).length_squared();
+        let longest = |points: &[Vec3]| points.iter().fold(0.0, |m, p| crate::math::max(lever(*p), m)).sqrt();
+        match self {
+            Self::Sphere(_) => lever(Vec3::ZERO).sqrt(),
+            Self::Capsule(s) => longest(&[Vec3::Y * s.half_length(), Vec3::Y * -s.half_length()]),
+            Self::Cuboid(s) => {
+                let h = s.half_extents();
+                let side = |i: u8, bit: u8, half: Real| if i >> bit & 1 == 1 { half } else { -half };
+                let corner = |i: u8| Vec3::new(side(i, 0, h.x), side(i, 1, h.y), side(i, 2, h.z));
+                longest(&[0, 1, 2, 3, 4, 5, 6, 7].map(corner))
+            }
+            Self::Hull(s) => longest(s.vertices()),
+            Self::Triangle(corners) => longest(corners),
+            Self::Points(points) => longest(points),
+            // The far points of the ends of its axis, which is as far as its rims reach.
+            Self::Cylinder(s) => longest(&[Vec3::Y * s.half_length(), Vec3::Y * -s.half_length()]) + s.radius(),
+            other => crate::math::max(other.reach(pivot) - other.radius(), 0.0),
+        }
     }
 
     /// Centre and radius of a ball that fits inside.
     pub(crate) fn inner_ball(&self) -> (Vec3, Real) {
         match self {
             Self::Triangle([a, b, c]) => ((*a + *b + *c) * (1.0 / 3.0), 0.0),
+            Self::Scaled { shape, center, factor } => (*center, shape.inner_ball().1 * factor),
             other => other.geometry().map_or((Vec3::ZERO, 0.0), |shape| shape.inner_ball()),
         }
     }
@@ -202,6 +252,7 @@ impl<'a> Support<'a> {
             Self::Rounded(s) => s.feature(d, out),
             Self::Transformed(s) => s.feature(d, out),
             Self::Custom(s) => s.feature(d, out),
+            Self::Points(_) | Self::Scaled { .. } => out.push(self.full_support(d.as_dvec3()).as_vec3()),
         }
     }
 }

@@ -4,10 +4,12 @@
 //! shapes, and no point crosses it faster than
 //!
 //! ```text
-//! speed ≤ (v1 − v2) · n + reach1 |ω1 × n| + reach2 |ω2 × n|
+//! speed ≤ (v1 − v2) · n + swing1 |ω1 × n| + swing2 |ω2 × n|
 //! ```
 //!
-//! so the gap stays above `target` for at least `(d − target) / speed`: the time goes on by that much, and the
+//! with the swing of a shape how far its core reaches from the axis about which it turns (the core: what is round is
+//! a ball at each of its points, and balls may turn as they like). So
+//! the gap stays above `target` for at least `(d − target) / speed`: the time goes on by that much, and the
 //! distance is taken anew, until it is the target's (Mirtich, "Impulse-based Dynamic Simulation", 1996, section 2.3).
 //! Nothing can be jumped over, however thin it is and however fast the shapes are. Positions move evenly; rotations
 //! blend as in [`Pose::interpolate`], about one axis, at most `4 tan(φ / 2)` radians per unit of time with `cos φ` the
@@ -60,6 +62,17 @@ impl Sweep {
         let turn = q.mul(p.conjugate()).vector() * sign;
         turn * (4.0 / (1.0 + p.dot(q).abs()))
     }
+
+    /// [`Self::spin`] times how far the core reaches from the axis.
+    fn swing_of(&self, shape: &Support) -> Vec3 {
+        let spin = self.spin();
+        let speed = spin.length();
+        if speed == 0.0 {
+            return Vec3::ZERO;
+        }
+        // The axis is the same at the end: it is what does not turn.
+        spin * shape.swing(self.pivot, self.start.rotation.inverse_rotate(spin / speed))
+    }
 }
 
 /// Shape 2 in the frame of shape 1, as a function of time.
@@ -104,9 +117,8 @@ pub(crate) fn time_of_impact(
 ) -> Option<Real> {
     let motion = Motion::new(sweep1, sweep2);
     let radii = shape1.radius() + shape2.radius();
-    let (spin1, spin2) = (sweep1.spin(), sweep2.spin());
-    let (reach1, reach2) = (shape1.reach(sweep1.pivot), shape2.reach(sweep2.pivot));
-    let rounding = 1e-6 * max(reach1, reach2);
+    let (spin1, spin2) = (sweep1.swing_of(shape1), sweep2.swing_of(shape2));
+    let rounding = 1e-6 * max(shape1.reach(sweep1.pivot), shape2.reach(sweep2.pivot));
     let mut target = target;
     let mut t: Real = 0.0;
     for round in 0..MAX_ROUNDS {
@@ -124,7 +136,7 @@ pub(crate) fn time_of_impact(
         }
         let normal = pose1.rotation.rotate(found.normal);
         let closing = -(motion.displacement.dot(normal.as_dvec3())) as Real;
-        let speed = closing + reach1 * spin1.cross(normal).length() + reach2 * spin2.cross(normal).length();
+        let speed = closing + spin1.cross(normal).length() + spin2.cross(normal).length();
         if speed <= 0.0 {
             return None;
         }

@@ -1,9 +1,9 @@
 //! Rays against single shapes, in the shape's own frame.
 //!
-//! A ray is `origin + t · direction` for `0 ≤ t ≤ max_fraction`; the direction need not be a unit vector, and `t` scales
-//! with its inverse. A ray that starts inside a shape (or on its surface, unless it enters there) hits at fraction 0 with a
-//! zero normal, for there is no surface to speak of. Otherwise the normal is the unit normal of the surface, pointing out.
-//! A hit exactly at `max_fraction` counts. Numbers that are not finite miss.
+//! A ray is `origin + t · direction` for `0 ≤ t ≤ max_fraction`; the direction need not be a unit vector, and `t`
+//! scales with its inverse. A ray that starts inside a shape (or on its surface, unless it enters there) hits at
+//! fraction 0 with a zero normal, for there is no surface to speak of. Otherwise the normal is the unit normal of the
+//! surface, pointing out. A hit exactly at `max_fraction` counts. Numbers that are not finite miss.
 //!
 //! - *Sphere, capsule:* the quadratic is solved about the point of the line that is closest to the centre, not about the
 //!   origin: with `p` that point, `t = t_p − sqrt(r² − |p|²) / |d|`, which keeps its digits when the origin is far away.
@@ -11,8 +11,11 @@
 //! - *Box:* the last of the three near planes is entered before the first far plane is left (slabs).
 //! - *Hull:* the same with the planes of all faces. Source: Cyrus and Beck, "Generalized two- and three-dimensional
 //!   clipping", 1978.
+//! - *Everything else:* GJK on the parts of the shape.
 
-use crate::math::{Real, Vec3};
+use super::parts::{Path, Region, Solid, visit_parts};
+use crate::math::{Pose, Real, Vec3};
+use crate::narrow_phase::{Cast, Support, linear_cast};
 use crate::shape::{Capsule, Cuboid, Plane, Shape};
 
 /// The part of a line from `origin` to `origin + max_fraction · direction`.
@@ -70,10 +73,69 @@ impl ShapeHit {
 
 /// The first point of a shape along a ray given in the shape's frame.
 ///
-/// Meshes have no inside; their own ray cast also tells the triangle.
+/// Meshes have no inside: a ray meets their triangles, those of one-sided meshes from the front only.
 #[must_use]
 pub fn cast_ray(shape: &Shape, ray: &Ray) -> Option<ShapeHit> {
-    shape.geometry().cast_ray(ray)
+    find(shape, ray).map(|found| found.hit)
+}
+
+/// Where a ray meets a shape, and which part of it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PartHit {
+    pub hit: ShapeHit,
+    pub child: Option<u32>,
+    pub triangle: Option<u32>,
+}
+
+/// As [`cast_ray`], with the part.
+#[inline]
+pub(crate) fn find(shape: &Shape, ray: &Ray) -> Option<PartHit> {
+    let hit = match shape {
+        Shape::Sphere(sphere) => cast_sphere(sphere.radius(), ray),
+        Shape::Capsule(capsule) => cast_capsule(capsule, ray),
+        Shape::Cuboid(cuboid) => cast_cuboid(cuboid, ray),
+        Shape::Hull(hull) => cast_planes(hull.planes(), ray),
+        Shape::Mesh(mesh) => {
+            let found = mesh.cast_ray(ray.origin, ray.direction, ray.max_fraction)?;
+            let hit = ShapeHit { fraction: found.distance, normal: found.normal };
+            return Some(PartHit { hit, child: None, triangle: Some(found.triangle) });
+        }
+        other if other.is_convex() || matches!(other, Shape::HalfSpace(_)) => other.geometry().cast_ray(ray),
+        other => return cast_parts(other, ray),
+    };
+    hit.map(|hit| PartHit { hit, child: None, triangle: None })
+}
+
+/// Any shape, by GJK on its parts: see `narrow_phase::linear_cast`.
+pub(crate) fn cast_parts(shape: &Shape, ray: &Ray) -> Option<PartHit> {
+    let is_sound = ray.origin.is_finite() && ray.direction.is_finite() && ray.max_fraction >= 0.0;
+    if !is_sound {
+        return None;
+    }
+    let probe = Support::Triangle([Vec3::ZERO; 3]);
+    let start = Pose::from_position(ray.origin);
+    let size = shape.local_aabb().half_extents().length();
+    let mut best: Option<PartHit> = None;
+    let (center, displacement, limit) = (ray.origin, ray.direction, ray.max_fraction);
+    let solid = Solid::point(center);
+    let region = Region::Path(Path { center, half: Vec3::ZERO, displacement, limit, solid });
+    visit_parts(shape, &region, |part, limit| {
+        let direction = part.vector_in(ray.direction);
+        let hit = match linear_cast((&part.support, &probe), &part.seen(&start), direction, limit, size) {
+            Cast::Miss => return limit,
+            Cast::Overlap => ShapeHit::INSIDE,
+            Cast::Hit(hit) => ShapeHit { fraction: hit.fraction, normal: part.vector_out(hit.normal) },
+        };
+        let ids = (part.child, part.triangle);
+        let first = best.is_none_or(|best| {
+            hit.fraction < best.hit.fraction || hit.fraction == best.hit.fraction && ids < (best.child, best.triangle)
+        });
+        if first {
+            best = Some(PartHit { hit, child: part.child, triangle: part.triangle });
+        }
+        crate::math::min(hit.fraction, limit)
+    });
+    best
 }
 
 /// A hit, if it lies on the ray.
@@ -108,8 +170,8 @@ pub(crate) fn cast_sphere(radius: Real, ray: &Ray) -> Option<ShapeHit> {
     hit_at(fraction, point / point.length(), ray)
 }
 
-/// The line first enters the infinite cylinder about y. Within the segment that is the hit. Past an end, everything that
-/// follows inside the cylinder reaches the capsule through the ball at that end, so the ball decides.
+/// The line first enters the infinite cylinder about y. Within the segment that is the hit. Past an end, everything
+/// that follows inside the cylinder reaches the capsule through the ball at that end, so the ball decides.
 pub(crate) fn cast_capsule(capsule: &Capsule, ray: &Ray) -> Option<ShapeHit> {
     let (radius, half_length) = (capsule.radius(), capsule.half_length());
     let (origin, direction) = (ray.origin, ray.direction);
@@ -145,7 +207,8 @@ impl Clip {
         Self { enter: 0.0, leave: ray.max_fraction, normal: Vec3::ZERO }
     }
 
-    /// Cuts off what lies in front of a plane, given the height of the origin over it and the rate at which the ray rises.
+    /// Cuts off what lies in front of a plane, given the height of the origin over it and the rate at which the ray
+    /// rises.
     #[inline(always)]
     fn cut(&mut self, normal: Vec3, height: Real, rate: Real) -> bool {
         if height.is_nan() || rate.is_nan() {

@@ -23,6 +23,7 @@
 
 use super::geometry::Geometry;
 use super::hull_builder::{Lattice, TriangulatedHull};
+use super::hull_core::eroded_corners;
 use super::hull_features::{HullFeatures, LANES};
 use super::hull_merge::{Outline, simplify, triangles_as_outlines};
 use super::{MassProperties, ShapeError, positive};
@@ -98,6 +99,10 @@ pub struct ConvexHull {
     features: HullFeatures,
     aabb: Aabb,
     inner_radius: Real,
+    /// A hull inside this one that is nowhere nearer to its surface than half the inner radius: see `hull_core`.
+    core: Vec<Vec3>,
+    /// The same, nine tenths of the inner radius inside.
+    spine: Vec<Vec3>,
     unit_mass: MassProperties,
 }
 
@@ -188,6 +193,16 @@ impl ConvexHull {
     #[must_use]
     pub fn vertices(&self) -> &[Vec3] {
         &self.vertices
+    }
+
+    /// The corners drawn inwards, each in the place of its vertex: what continuous collision lets nothing come to.
+    pub(crate) fn core(&self) -> &[Vec3] {
+        &self.core
+    }
+
+    /// The corners drawn in nearly as far as the shape is thick.
+    pub(crate) fn spine(&self) -> &[Vec3] {
+        &self.spine
     }
 
     /// Face planes.
@@ -341,6 +356,8 @@ impl Polyhedron<'_> {
         let inner_radius = lowest(planes.iter().map(height)) as Real;
         let edge_directions = self.edge_directions(&edges);
         let features = HullFeatures::new(&self.vertices, &planes, &edges, unit_mass.center);
+        let core = eroded_corners(&self.vertices, &planes, unit_mass.center, 0.5 * inner_radius);
+        let spine = eroded_corners(&self.vertices, &planes, unit_mass.center, 0.9 * inner_radius);
         let vertices = self.vertices;
         Some(Ok(ConvexHull {
             vertices,
@@ -351,6 +368,8 @@ impl Polyhedron<'_> {
             features,
             aabb,
             inner_radius,
+            core,
+            spine,
             unit_mass,
         }))
     }

@@ -6,11 +6,12 @@
 //!
 //! Rays use the watertight test of Woop, Benthin and Wald ("Watertight Ray/Triangle Intersection", 2013) with its edge
 //! functions in double precision: both sides of a shared edge compute the same number with opposite sign, so a ray
-//! cannot slip through between them.
+//! cannot slip through between them. The triangles of a leaf are first looked at side by side in single precision with a bound
+//! on its rounding, which passes on all that the exact test might hit.
 
 use super::geometry::Geometry;
 use super::mesh_edges::{Adjacency, Surface, Surroundings};
-use super::mesh_tree::{LEAF, Leaves, MeshTree, Slabs};
+use super::mesh_tree::{Descent, LEAF, Leaves, MeshTree, Slabs};
 use super::{MassProperties, ShapeError};
 use crate::math::{Aabb, Real, Vec3, max3, min3};
 use crate::query::{self, ShapeHit};
@@ -188,25 +189,26 @@ impl TriangleMesh {
     /// from the front only. Of triangles met at the same distance the one with the smallest number is reported.
     #[must_use]
     pub fn cast_ray(&self, origin: Vec3, direction: Vec3, limit: Real) -> Option<MeshRayHit> {
-        let ray = Ray::new(origin, direction)?;
-        let mut best: Option<(Real, usize, bool)> = None;
-        let mut reach = limit;
-        self.tree.cast(&Slabs::new(origin, direction), limit, |index| {
-            let id = self.surroundings[index].id;
-            if let Some((distance, back)) = ray.hit(&self.corners(index), self.sides)
-                && distance <= reach
-                && best.is_none_or(|(d, other, _)| (distance, id) < (d, self.surroundings[other].id))
-            {
-                reach = distance;
-                best = Some((distance, index, back));
-            }
-            reach
-        });
-        best.map(|(distance, index, back)| {
+        let ray = Ray::new(origin, direction, &self.tree.around())?;
+        let slabs = Slabs::of_point(origin, direction);
+        let mut search = RaySearch { mesh: self, ray, slabs, best: None };
+        self.tree.descend(limit, &mut search);
+        search.best.map(|(distance, index, back)| {
             let normal = self.facet(index).normal();
             let normal = if back { -normal } else { normal };
             MeshRayHit { distance, normal, triangle: self.surroundings[index].id }
         })
+    }
+
+    /// Shows the triangles to a search that wants the nearest first.
+    pub(crate) fn descend(&self, limit: Real, search: &mut impl Descent) {
+        self.tree.descend(limit, search);
+    }
+
+    /// The user's number of a triangle.
+    #[inline(always)]
+    pub(crate) fn id(&self, index: usize) -> u32 {
+        self.surroundings[index].id
     }
 
     pub(crate) fn local_aabb(&self) -> Aabb {
@@ -380,10 +382,13 @@ struct Ray {
     origin: Vec3,
     axes: [usize; 3],
     shear: [f64; 3],
+    /// What rounding to single precision does to a sheared coordinate at most, twice over.
+    rounding: Real,
 }
 
 impl Ray {
-    fn new(origin: Vec3, direction: Vec3) -> Option<Self> {
+    /// A ray for triangles in the box `around`.
+    fn new(origin: Vec3, direction: Vec3, around: &Aabb) -> Option<Self> {
         let size = crate::math::abs3(direction);
         let z = if size.x >= size.y && size.x >= size.z { 0 } else { 1 + usize::from(size.z > size.y) };
         if !(size[z] > 0.0 && direction.is_finite() && origin.is_finite()) {
@@ -391,7 +396,42 @@ impl Ray {
         }
         let (x, y) = ((z + 1) % 3, (z + 2) % 3);
         let d = direction.as_dvec3();
-        Some(Self { origin, axes: [x, y, z], shear: [d[x] / d[z], d[y] / d[z], 1.0 / d[z]] })
+        let shear = [d[x] / d[z], d[y] / d[z], 1.0 / d[z]];
+        // A difference, a factor of at most 1 and its product, and another difference of up to twice that: 5 half-steps.
+        let rounding = 6e-7 * around.farthest_from(origin).max_element();
+        Some(Self { origin, axes: [x, y, z], shear, rounding })
+    }
+
+    /// The triangles that [`Ray::hit`] may hit, a bit each: those whose edge functions are of one sign as far as single
+    /// precision can tell, and that do not turn away a ray from behind for sure.
+    #[inline(always)]
+    fn may_hit<W: Lanes<LEAF>>(&self, corners: &[LaneVec3<W>; 3], sides: MeshSides) -> u32 {
+        let [x, y, z] = self.axes;
+        let (shear_x, shear_y) = (W::splat(self.shear[0] as Real), W::splat(self.shear[1] as Real));
+        let origin = LaneVec3::<W>::splat(self.origin);
+        let mut sheared = [[W::ZERO; 2]; 3];
+        let mut extent = W::ZERO;
+        for i in 0..3 {
+            let p = (corners[i] - origin).columns();
+            sheared[i] = [p[x] - shear_x * p[z], p[y] - shear_y * p[z]];
+            extent = sheared[i][0].abs().max(sheared[i][1].abs()).max(extent);
+        }
+        let [a, b, c] = sheared;
+        let u = c[0] * b[1] - c[1] * b[0];
+        let v = a[0] * c[1] - a[1] * c[0];
+        let w = b[0] * a[1] - b[1] * a[0];
+        // Each of the four factors is off by `rounding`, each product and the difference by half-steps of `extent²`.
+        let rounding = W::splat(self.rounding);
+        let error = W::splat(4.0) * rounding * (extent + rounding) + W::splat(5e-7) * extent * extent;
+        let (least, most) = (u.min(v).min(w), u.max(v).max(w));
+        let one = W::splat(1.0);
+        let mixed = most.if_above(error, (-least).if_above(error, one, W::ZERO), W::ZERO);
+        let mut may = one - mixed;
+        if sides == MeshSides::One {
+            let front = if self.shear[2] < 0.0 { -(u + v + w) } else { u + v + w };
+            may = (-front).if_above(W::splat(4.0) * error, W::ZERO, may);
+        }
+        may.positive()
     }
 
     /// How far along the ray a triangle is met, and whether from behind.
@@ -417,6 +457,43 @@ impl Ray {
         // The sum is minus twice the area as seen along the axis, which the ray may run down.
         let back = (sum < 0.0) != (self.shear[2] < 0.0);
         (distance >= 0.0 && !(back && sides == MeshSides::One)).then_some((distance, back))
+    }
+}
+
+/// The first triangle along a ray.
+struct RaySearch<'a> {
+    mesh: &'a TriangleMesh,
+    ray: Ray,
+    slabs: Slabs,
+    /// Distance, internal number, whether hit from behind.
+    best: Option<(Real, usize, bool)>,
+}
+
+impl Descent for RaySearch<'_> {
+    #[inline(always)]
+    fn distances<W: Lanes<LEAF>>(&self, low: &LaneVec3<W>, high: &LaneVec3<W>, limit: Real) -> W {
+        self.slabs.enter(low, high, limit)
+    }
+
+    #[inline(always)]
+    fn leaf<W: Lanes<LEAF>>(&mut self, first: usize, count: usize, limit: Real) -> Real {
+        let corners = self.mesh.corners_of_leaf::<W>(first, count);
+        let mut bits = self.ray.may_hit(&corners, self.mesh.sides) & ((1 << count) - 1);
+        let mut limit = limit;
+        while bits != 0 {
+            let index = first + bits.trailing_zeros() as usize % LEAF;
+            bits &= bits - 1;
+            let Some((distance, back)) = self.ray.hit(&self.mesh.corners(index), self.mesh.sides) else { continue };
+            let first = match self.best {
+                Some((best, other, _)) => (distance, self.mesh.id(index)) < (best, self.mesh.id(other)),
+                None => true,
+            };
+            if distance <= limit && first {
+                limit = distance;
+                self.best = Some((distance, index, back));
+            }
+        }
+        limit
     }
 }
 

@@ -9,7 +9,7 @@
 //! Source of the wide tree: Wald, Benthin, Boulos, "Getting Rid of Packets", 2008.
 
 use super::mesh_tree_builder::Builder;
-use crate::math::{Aabb, Real, Vec3};
+use crate::math::{Aabb, Real, Vec3, abs3};
 use crate::simd::{KernelOfEight, LaneVec3, Lanes, Number, Wide, run_eight};
 
 /// Children of a node.
@@ -96,48 +96,75 @@ impl MeshTree {
         self.walk(aabb, &mut Each(visit));
     }
 
-    /// Walks the leaves along a ray, near ones first. `visit` gets a stored triangle and returns how far (in multiples of
-    /// the direction) is still of interest.
-    pub(super) fn cast(&self, ray: &Slabs, limit: Real, mut visit: impl FnMut(usize) -> Real) {
-        let mut limit = limit;
-        // Children that the ray enters (eight times the node's number plus the lane), and where it does.
+    /// Shows the leaves to a search that wants the nearest first.
+    #[inline]
+    pub(super) fn descend(&self, limit: Real, search: &mut impl Descent) {
+        run_eight(Descend { nodes: &self.nodes, limit, search });
+    }
+}
+
+/// A search that goes down the tree nearest box first, and ever less far.
+pub(crate) trait Descent {
+    /// How far away the boxes with these corners are; [`Real::MAX`] for those farther than `limit`.
+    fn distances<W: Lanes<WIDTH>>(&self, low: &LaneVec3<W>, high: &LaneVec3<W>, limit: Real) -> W;
+
+    /// Looks at a leaf with the triangles from `first` on; returns how far is of interest from now on, negative to stop.
+    fn leaf<W: Lanes<WIDTH>>(&mut self, first: usize, count: usize, limit: Real) -> Real;
+}
+
+struct Descend<'a, S> {
+    nodes: &'a [Node],
+    limit: Real,
+    search: &'a mut S,
+}
+
+impl<S: Descent> KernelOfEight for Descend<'_, S> {
+    #[inline(always)]
+    fn run<W: Lanes<WIDTH>>(self) {
+        let mut limit = self.limit;
+        // Children still to be visited (eight times the node's number plus the lane), and how far away they are.
         let mut stack = [(0_u32, 0.0 as Real); MOST_LEVELS * (WIDTH - 1) + 1];
-        let mut top = self.enter(0, ray, limit, &mut stack, 0);
-        while top > 0 {
-            top -= 1;
-            let (child, entry) = stack[top];
-            if entry > limit {
-                continue;
+        let mut top = 0;
+        let mut index = 0;
+        loop {
+            let node = &self.nodes[index as usize];
+            let distances = self.search.distances::<W>(&node.low.to_lanes(), &node.high.to_lanes(), limit);
+            let mut lanes = W::splat(Real::MAX).if_above(distances, W::splat(1.0), W::ZERO).positive();
+            let distances = distances.to_array();
+            let bottom = top;
+            while lanes != 0 {
+                let lane = lanes.trailing_zeros() as usize % WIDTH;
+                lanes &= lanes - 1;
+                let distance = distances[lane];
+                let mut place = top;
+                while place > bottom && stack[place - 1].1 < distance {
+                    stack[place] = stack[place - 1];
+                    place -= 1;
+                }
+                stack[place] = (index * WIDTH as u32 + lane as u32, distance);
+                top += 1;
             }
-            let (node, lane) = (&self.nodes[child as usize / WIDTH], child as usize % WIDTH);
-            if node.counts[lane] == 0 {
-                top = self.enter(node.first[lane], ray, limit, &mut stack, top);
-            } else {
-                for triangle in node.first[lane]..node.first[lane] + u32::from(node.counts[lane]) {
-                    limit = visit(triangle as usize);
+            // Down to the next node, past leaves.
+            loop {
+                if top == 0 {
+                    return;
+                }
+                top -= 1;
+                let (child, distance) = stack[top];
+                if distance > limit {
+                    continue;
+                }
+                let (node, lane) = (&self.nodes[child as usize / WIDTH], child as usize % WIDTH);
+                if node.counts[lane] == 0 {
+                    index = node.first[lane];
+                    break;
+                }
+                limit = self.search.leaf::<W>(node.first[lane] as usize, node.counts[lane] as usize, limit);
+                if limit < 0.0 {
+                    return;
                 }
             }
         }
-    }
-
-    /// Puts the children that a ray enters on the stack, the nearest last. Returns the new height of the stack.
-    fn enter(&self, node: u32, ray: &Slabs, limit: Real, stack: &mut [(u32, Real)], top: usize) -> usize {
-        let mut entries = [0.0; WIDTH];
-        run_eight(Entries { node: &self.nodes[node as usize], ray, limit, entries: &mut entries });
-        let mut end = top;
-        for (lane, &entry) in entries.iter().enumerate() {
-            if entry == Real::MAX {
-                continue;
-            }
-            let mut place = end;
-            while place > top && stack[place - 1].1 < entry {
-                stack[place] = stack[place - 1];
-                place -= 1;
-            }
-            stack[place] = (node * WIDTH as u32 + lane as u32, entry);
-            end += 1;
-        }
-        end
     }
 }
 
@@ -215,51 +242,97 @@ fn keep_overlapping<W: Number>(found: W, [low, high]: [W; 2], [wanted_low, wante
     high.if_at_least(wanted_low, found, W::ZERO)
 }
 
-/// A ray made ready for boxes.
+/// A box that moves along a line, or a point of it, made ready for boxes.
+///
+/// The box enters another where its centre enters that one grown by its half extents. The near planes are moved towards the
+/// start and the far ones away from it by more than the three roundings on the way can do, so that no box is missed whose
+/// triangle an exact test would hit. Source: Ize, "Robust BVH Ray Traversal", 2013.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Slabs {
-    origin: [Real; 3],
-    inverse: [Real; 3],
+pub(crate) struct Slabs {
+    origin: Vec3,
+    half: Vec3,
+    axes: [Slab; 3],
+    slack: Real,
+}
+
+/// An axis of a direction: its inverse for near planes and for far ones. Both are zero where the direction is.
+#[derive(Clone, Copy, Debug)]
+struct Slab {
+    near: Real,
+    far: Real,
+}
+
+impl Slab {
+    /// More than `1 + 3 · 2⁻²⁴`, twice over.
+    const GROW: Real = 1.0 + 1e-6;
+
+    fn new(direction: Real) -> Self {
+        let inverse = if direction == 0.0 { 0.0 } else { 1.0 / direction };
+        Self { near: inverse / Self::GROW, far: inverse * Self::GROW }
+    }
 }
 
 impl Slabs {
-    pub(super) fn new(origin: Vec3, direction: Vec3) -> Self {
-        let inverse = |d: Real| if d == 0.0 { 0.0 } else { 1.0 / d };
-        Self { origin: origin.to_array(), inverse: direction.to_array().map(inverse) }
+    /// A point that moves from `origin` along `direction`.
+    pub(crate) fn of_point(origin: Vec3, direction: Vec3) -> Self {
+        let axes = [Slab::new(direction.x), Slab::new(direction.y), Slab::new(direction.z)];
+        Self { origin, half: Vec3::ZERO, axes, slack: 0.0 }
     }
-}
 
-/// Where a ray enters the boxes of a node before `limit`; [`Real::MAX`] for those that it misses. Boxes are grown by a
-/// few rounding errors, so that none is missed whose triangle the exact test would hit.
-struct Entries<'a> {
-    node: &'a Node,
-    ray: &'a Slabs,
-    limit: Real,
-    entries: &'a mut [Real; WIDTH],
-}
+    /// A box with these half extents, for a tree with this box around it.
+    pub(crate) fn of_box(origin: Vec3, half: Vec3, direction: Vec3, around: &Aabb) -> Self {
+        // Growing a box rounds its corners.
+        let slack = 1e-6 * (around.farthest_from(Vec3::ZERO) + abs3(origin) + half);
+        Self { half: half + slack, slack: slack.max_element(), ..Self::of_point(origin, direction) }
+    }
 
-impl KernelOfEight for Entries<'_> {
+    /// Fraction at which the line enters each box by `limit`; [`Real::MAX`] for those that it misses.
     #[inline(always)]
-    fn run<W: Lanes<WIDTH>>(self) {
-        const GROW: Real = 1.0 + 1e-6;
-        let (low, high): (LaneVec3<W>, LaneVec3<W>) = (self.node.low.to_lanes(), self.node.high.to_lanes());
+    pub(crate) fn enter<W: Lanes<WIDTH>>(&self, low: &LaneVec3<W>, high: &LaneVec3<W>, limit: Real) -> W {
+        let (enter, leave) = self.pass(low, high, limit);
+        leave.if_at_least(enter, enter, W::splat(Real::MAX))
+    }
+
+    /// Fractions at which the line enters each box and leaves it again or reaches the limit; in reverse order for those that it
+    /// misses.
+    #[inline(always)]
+    pub(crate) fn pass<W: Lanes<WIDTH>>(&self, low: &LaneVec3<W>, high: &LaneVec3<W>, limit: Real) -> (W, W) {
         let (low, high) = (low.columns(), high.columns());
         let none = W::splat(Real::MAX);
-        let (mut enter, mut leave) = (W::ZERO, W::splat(self.limit));
+        let (mut enter, mut leave) = (W::ZERO, W::splat(limit));
         for axis in 0..3 {
-            let origin = W::splat(self.ray.origin[axis]);
-            let slack = W::splat(1e-6) * low[axis].abs().max(high[axis].abs()).max(origin.abs());
-            let (a, b) = (low[axis] - origin - slack, high[axis] - origin + slack);
-            let inverse = self.ray.inverse[axis];
-            if inverse == 0.0 {
-                enter = a.if_positive(none, enter);
-                enter = b.if_at_least(W::ZERO, enter, none);
+            let (origin, half) = (self.origin[axis], self.half[axis]);
+            let (a, b) = if half == 0.0 {
+                (low[axis] - W::splat(origin), high[axis] - W::splat(origin))
+            } else {
+                (low[axis] - W::splat(half) - W::splat(origin), high[axis] + W::splat(half) - W::splat(origin))
+            };
+            let inverse = self.axes[axis];
+            if inverse.far == 0.0 {
+                leave = a.if_positive(-none, leave);
+                leave = b.if_at_least(W::ZERO, leave, -none);
                 continue;
             }
-            let (near, far) = if inverse > 0.0 { (a, b) } else { (b, a) };
-            enter = (near * W::splat(inverse / GROW)).max(enter);
-            leave = (far * W::splat(inverse * GROW)).min(leave);
+            let (near, far) = if inverse.far > 0.0 { (a, b) } else { (b, a) };
+            enter = (near * W::splat(inverse.near)).max(enter);
+            leave = (far * W::splat(inverse.far)).min(leave);
         }
-        *self.entries = leave.if_at_least(enter, enter, none).to_array();
+        (enter, leave)
     }
+
+    /// How much the box was grown against rounding, at most.
+    pub(crate) fn slack(&self) -> Real {
+        self.slack
+    }
+}
+
+/// Squared distance of a box from each of eight; [`Real::MAX`] for those farther than `limit` (squared as well).
+#[inline(always)]
+pub(crate) fn box_distances<W: Lanes<WIDTH>>(aabb: &Aabb, low: &LaneVec3<W>, high: &LaneVec3<W>, limit: Real) -> W {
+    let zero = W::ZERO;
+    let x = (low.x - W::splat(aabb.max.x)).max(W::splat(aabb.min.x) - high.x).max(zero);
+    let y = (low.y - W::splat(aabb.max.y)).max(W::splat(aabb.min.y) - high.y).max(zero);
+    let z = (low.z - W::splat(aabb.max.z)).max(W::splat(aabb.min.z) - high.z).max(zero);
+    let squared = x * x + y * y + z * z;
+    W::splat(limit).if_at_least(squared, squared, W::splat(Real::MAX))
 }

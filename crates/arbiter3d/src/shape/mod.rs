@@ -19,6 +19,7 @@ mod geometry;
 mod half_space;
 mod hull;
 mod hull_builder;
+mod hull_core;
 mod hull_features;
 mod hull_merge;
 mod mass;
@@ -49,7 +50,7 @@ pub use mass::MassProperties;
 pub(crate) use mesh::Facet;
 pub use mesh::{MeshRayHit, MeshSides, TriangleMesh};
 pub(crate) use mesh_edges::Surroundings;
-pub(crate) use mesh_tree::{LEAF, Leaves};
+pub(crate) use mesh_tree::{Descent, LEAF, Leaves, Slabs, box_distances};
 pub use point_cloud::PointCloud;
 pub use rounded::Rounded;
 pub use sphere::Sphere;
@@ -360,7 +361,7 @@ impl Shape {
         let map = |point: Vec3| linear * point + translation;
         let all = |points: &[Vec3]| points.iter().map(|&point| map(point)).collect::<Vec<_>>();
         match self {
-            Self::Cuboid(s) => Self::hull(&all(&ConvexHull::from_cuboid(s.half_extents())?.vertices().to_vec())),
+            Self::Cuboid(s) => Self::hull(&all(ConvexHull::from_cuboid(s.half_extents())?.vertices())),
             Self::Hull(s) => Self::hull(&all(s.vertices())),
             Self::PointCloud(s) => Self::point_cloud(&all(s.points())),
             Self::Triangle(s) => Self::triangle(s.corners().map(map)),

@@ -12,7 +12,7 @@
 //! of the step before, as in a pile at rest, so are the colours.
 
 use super::bodies::SolverBodies;
-use crate::arbiter::{Arbiter, ArbiterKey, ContactData, Entry, ONE_NORMAL, SLOTS};
+use crate::arbiter::{ANISOTROPIC, Arbiter, ArbiterKey, ContactData, Entry, ONE_NORMAL, SLOTS};
 use crate::math::Vec3;
 use crate::parallel::{SharedSlice, StagePool};
 use crate::place_table::mix;
@@ -96,6 +96,7 @@ impl Record {
         let extra = data.restitution > 0.0
             || data.rolling_resistance > 0.0
             || data.tangent_velocity != Vec3::ZERO
+            || data.flags & ANISOTROPIC != 0
             || states[0].locked != 0
             || states[1].locked != 0;
         Self {

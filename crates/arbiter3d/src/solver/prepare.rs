@@ -14,7 +14,7 @@
 use super::bodies::{BodyMass, READ_ONLY, SharedStates, SolverBodies, gather};
 use super::coloring::RowSource;
 use super::rows::{ExtraRow, FrictionRow, NormalRow, RowFeatures};
-use crate::arbiter::{Arbiter, Contact, ONE_NORMAL, SLOTS, SolveMode};
+use crate::arbiter::{ANISOTROPIC, Arbiter, Contact, ONE_NORMAL, SLOTS, SolveMode};
 use crate::math::{Real, Vec3};
 use crate::simd::{LaneRotation, LaneSymmetric, LaneVec3, Lanes, Number, Quad};
 
@@ -88,6 +88,10 @@ pub(crate) fn prepare_row<W: Lanes<L>, const L: usize, const P: usize, const C: 
     gather_points(row, &mut gathered.0, (&frame1, &frame2), (sources, context));
     let gathered = gathered.0;
     let separations = prepare_normals(row, &gathered);
+    friction.tangent1 = wide_tangent(&row.normal);
+    if let Some(extra) = extra.as_deref_mut().filter(|_| features.anisotropic) {
+        align_tangents(row, friction, extra, sources, context);
+    }
     prepare_friction(row, friction, &gathered, &separations, context.speculative_distance);
     let mut coefficients = [0.0; L];
     for (lane, source) in sources.iter().enumerate().take(L) {
@@ -108,6 +112,7 @@ fn features_of(sources: &[RowSource], context: &PrepareContext<'_>) -> RowFeatur
         features.restitution |= data.restitution > 0.0;
         features.rolling |= source.is_first() && data.rolling_resistance > 0.0;
         features.conveyor |= data.tangent_velocity != Vec3::ZERO;
+        features.anisotropic |= data.flags & ANISOTROPIC != 0;
     }
     features
 }
@@ -337,7 +342,7 @@ fn prepare_normals<W: Lanes<L>, const L: usize, const P: usize, const C: usize>(
     separations
 }
 
-/// Friction centre, tangents and their response, and the impulses of the last step turned into these tangents.
+/// Friction centre, the response of the tangents, and the impulses of the last step turned into these tangents.
 ///
 /// The centre is the mean of the points, where points that are apart fade out between one and two speculative distances: a
 /// point that only might touch must not shift the friction.
@@ -367,9 +372,9 @@ fn prepare_friction<W: Lanes<L>, const L: usize, const P: usize, const C: usize>
         let sideways = gathered.apart[i].sub_scaled(&row.normal, separation);
         friction.drift = friction.drift.max((sideways.dot(&sideways) * gathered.present[i]).sqrt());
     }
-    let t1 = wide_tangent(&row.normal);
+    let t1 = friction.tangent1;
     let t2 = row.normal.cross(&t1);
-    (friction.tangent1, friction.lever1, friction.lever2) = (t1, r1, r2);
+    (friction.lever1, friction.lever2) = (r1, r2);
     let (arm11, arm21, arm12, arm22) = (r1.cross(&t1), r2.cross(&t1), r1.cross(&t2), r2.cross(&t2));
     let turned11 = row.inverse_inertia1.mul(&arm11);
     let turned21 = row.inverse_inertia2.mul(&arm21);
@@ -399,6 +404,33 @@ fn wide_tangent<W: Number>(n: &LaneVec3<W>) -> LaneVec3<W> {
     let a = -(one / (sign + n.z));
     LaneVec3 { x: one + sign * n.x * n.x * a, y: sign * (n.x * n.y * a), z: -(sign * n.x) }
 }
+
+/// Turns the first tangent of anisotropic lanes to the direction along which friction differs. Where that stands
+/// straight up, friction is the same in all directions.
+#[inline(always)]
+fn align_tangents<W: Lanes<L>, const L: usize, const P: usize, const C: usize>(
+    row: &NormalRow<W, L, P, C>,
+    friction: &mut FrictionRow<W, P>,
+    extra: &mut ExtraRow<W, P>,
+    sources: &[RowSource],
+    context: &PrepareContext<'_>,
+) {
+    for (lane, source) in sources.iter().enumerate().take(L) {
+        let data = &context.arbiters[source.arbiter as usize].data;
+        if data.flags & ANISOTROPIC != 0 {
+            let normal = row.normal.get(lane);
+            let along = data.friction_direction - normal * normal.dot(data.friction_direction);
+            let length = along.length();
+            if length > LEAST_PART_ALONG {
+                friction.tangent1.set(lane, along / length);
+                extra.ratio.set(lane, data.friction_ratio);
+            }
+        }
+    }
+}
+
+/// Part along the surface that a direction of friction has to have: less than 0.6° off the normal it tells nothing.
+const LEAST_PART_ALONG: Real = 0.01;
 
 /// Rolling resistance, surface velocities and restitution.
 #[inline(always)]

@@ -11,9 +11,9 @@
 //! row.
 //!
 //! What both passes need stands in [`NormalRow`]; what only the relax pass needs stands in [`FrictionRow`], so that the
-//! biased pass streams less memory: passes over more rows than the cache holds take as long as their bytes. What few rows
-//! need (rolling, restitution, conveyors, locked axes) stands in [`ExtraRow`]: only those wide rows have one that ask for it,
-//! and it is read where [`RowFeatures`] say so.
+//! biased pass streams less memory: passes over more rows than the cache holds take as long as their bytes. What few
+//! rows need (rolling, restitution, conveyors, anisotropic friction, locked axes) stands in [`ExtraRow`]: only those
+//! wide rows have one that ask for it, and it is read where [`RowFeatures`] say so.
 
 use crate::simd::{LaneSymmetric, LaneVec3, Lanes, Number};
 
@@ -85,6 +85,8 @@ pub(crate) struct ExtraRow<W, const P: usize> {
     /// Surface velocity along the tangents.
     pub target1: W,
     pub target2: W,
+    /// Friction along the first tangent as a share of that along the second; 0 where both are the same.
+    pub ratio: W,
     pub rolling_resistance: W,
     pub rolling_impulse: LaneVec3<W>,
     pub restitution: W,
@@ -98,6 +100,8 @@ pub(crate) struct RowFeatures {
     /// Some body cannot move along some axis.
     pub locks: bool,
     pub conveyor: bool,
+    /// Friction differs along a direction.
+    pub anisotropic: bool,
     pub rolling: bool,
     pub restitution: bool,
 }
@@ -105,7 +109,7 @@ pub(crate) struct RowFeatures {
 impl RowFeatures {
     /// Whether the extra row is used at all.
     pub fn any(self) -> bool {
-        self.locks | self.conveyor | self.rolling | self.restitution
+        self.locks | self.conveyor | self.anisotropic | self.rolling | self.restitution
     }
 }
 
@@ -153,6 +157,7 @@ impl<W: Number, const P: usize> ExtraRow<W, P> {
         free2: LaneVec3::ZERO,
         target1: W::ZERO,
         target2: W::ZERO,
+        ratio: W::ZERO,
         rolling_resistance: W::ZERO,
         rolling_impulse: LaneVec3::ZERO,
         restitution: W::ZERO,

@@ -308,8 +308,13 @@ impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> RowPass<'_, W,
         let wanted1 = old1 - (friction.mass11 * slip1 + friction.mass12 * slip2);
         let wanted2 = old2 - (friction.mass12 * slip1 + friction.mass22 * slip2);
         let scale = cone_scale(wanted1 * wanted1 + wanted2 * wanted2, friction.friction * load);
-        friction.impulse1 = wanted1 * scale;
-        friction.impulse2 = wanted2 * scale;
+        (friction.impulse1, friction.impulse2) = (wanted1 * scale, wanted2 * scale);
+        if let (true, Some(extra)) = (self.features.anisotropic, &self.extra) {
+            let limit = friction.friction * load;
+            let (on1, on2) = on_ellipse(friction, [wanted1, wanted2], extra.ratio, limit);
+            friction.impulse1 = extra.ratio.if_positive(on1, friction.impulse1);
+            friction.impulse2 = extra.ratio.if_positive(on2, friction.impulse2);
+        }
         let change = [friction.impulse1 - old1, friction.impulse2 - old2];
         self.apply_friction(&tangents, change, sides);
     }
@@ -401,9 +406,124 @@ impl<W: Number> Impulse<W> {
     }
 }
 
+/// Newton steps towards the ellipse of anisotropic friction.
+const ELLIPSE_STEPS: usize = 6;
+
+/// The friction impulse inside the ellipse `(f₁ / r)² + f₂² ≤ limit²` that leaves least energy of sliding.
+///
+/// With `f = D y`, `D = diag(r, 1)` and the response `K = D A D`, that is the `y` of length `limit` at most that is
+/// nearest to the wanted one `w` in the metric of `K`: `(K + λ) y = K w` for a `λ ≥ 0` that makes the length right,
+/// found by Newton's method on `1 / |y|`, which is nearly straight in `λ` (Moré and Sorensen, "Computing a trust region
+/// step", 1983). Merely shortening `w`, as in a circle, would let a ski that is pushed at an angle drift off sideways.
+#[inline(always)]
+fn on_ellipse<W: Number, const P: usize>(friction: &FrictionRow<W, P>, wanted: [W; 2], ratio: W, limit: W) -> (W, W) {
+    let (zero, one) = (W::ZERO, W::splat(1.0));
+    // The response is the inverse of the mass; everything is measured in limits, so that loads of any size are alike.
+    let (m11, m12, m22) = (friction.mass11, friction.mass12, friction.mass22);
+    let inverse = (m11 * m22 - m12 * m12).inverse_or_zero();
+    let (k11, k12, k22) = (m22 * inverse * ratio * ratio, -(m12 * inverse * ratio), m11 * inverse);
+    let unit = limit.inverse_or_zero();
+    let (w1, w2) = (wanted[0] * unit * ratio.inverse_or_zero(), wanted[1] * unit);
+    let (b1, b2) = (k11 * w1 + k12 * w2, k12 * w1 + k22 * w2);
+    let (mut shift, mut y1, mut y2) = (zero, w1, w2);
+    for _ in 0..ELLIPSE_STEPS {
+        let (length, inverse) = ((y1 * y1 + y2 * y2).sqrt(), inverse_of(k11, k12, k22, shift));
+        let curve = inverse.0 * y1 * y1 + (inverse.1 + inverse.1) * y1 * y2 + inverse.2 * y2 * y2;
+        shift = (shift + length * length * curve.inverse_or_zero() * (length - one)).max(zero);
+        let (i11, i12, i22) = inverse_of(k11, k12, k22, shift);
+        (y1, y2) = (i11 * b1 + i12 * b2, i12 * b1 + i22 * b2);
+    }
+    let inside = one - (w1 * w1 + w2 * w2);
+    let (y1, y2) = (inside.if_positive(w1, y1), inside.if_positive(w2, y2));
+    let scale = cone_scale(y1 * y1 + y2 * y2, one) * limit;
+    // Numbers beyond reckoning push nothing.
+    let (f1, f2) = (y1 * scale * ratio, y2 * scale);
+    let sound = (limit * limit * W::splat(1.001)).if_at_least(y1 * scale * (y1 * scale) + f2 * f2, limit, zero);
+    (sound.if_positive(f1, zero), sound.if_positive(f2, zero))
+}
+
+/// The inverse of a symmetric 2×2 matrix with `shift` on its diagonal, as `(11, 12, 22)`.
+#[inline(always)]
+fn inverse_of<W: Number>(k11: W, k12: W, k22: W, shift: W) -> (W, W, W) {
+    let (a, d) = (k11 + shift, k22 + shift);
+    let inverse = (a * d - k12 * k12).inverse_or_zero();
+    (d * inverse, -(k12 * inverse), a * inverse)
+}
+
 /// Scales a length down to a limit: `limit / length` where it is longer, else 1.
 #[inline(always)]
 fn cone_scale<W: Number>(squared_length: W, limit: W) -> W {
     let excess = squared_length - limit * limit;
     excess.if_positive(limit / squared_length.sqrt(), W::splat(1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Number, on_ellipse};
+    use crate::math::Real;
+    use crate::simd::Wide;
+    use crate::solver::rows::FrictionRow;
+
+    /// The impulse for a response `[k11, k12, k22]`, one lane wide.
+    fn solve([k11, k12, k22]: [Real; 3], wanted: [Real; 2], ratio: Real, limit: Real) -> [Real; 2] {
+        let determinant = k11 * k22 - k12 * k12;
+        let mut friction = FrictionRow::<Wide<1>, 4>::EMPTY;
+        friction.mass11 = Wide::splat(k22 / determinant);
+        friction.mass12 = Wide::splat(-k12 / determinant);
+        friction.mass22 = Wide::splat(k11 / determinant);
+        let (f1, f2) = on_ellipse(&friction, wanted.map(Wide::splat), Wide::splat(ratio), Wide::splat(limit));
+        [f1.0[0], f2.0[0]]
+    }
+
+    /// Energy of sliding that is left, but for a constant.
+    fn energy([k11, k12, k22]: [Real; 3], f: [Real; 2], wanted: [Real; 2]) -> f64 {
+        let [x, y] = [0, 1].map(|axis| f64::from(f[axis]) - f64::from(wanted[axis]));
+        f64::from(k11) * x * x + 2.0 * f64::from(k12) * x * y + f64::from(k22) * y * y
+    }
+
+    /// No point of the ellipse leaves less energy than the one found, whatever the ratio, the response and the load.
+    #[test]
+    fn the_impulse_on_the_ellipse_leaves_least_energy() {
+        for ratio in [0.001, 0.02, 0.1, 0.5, 0.99, 1.5, 10.0, 1000.0_f32] {
+            for response in [[1.0, 0.0, 1.0], [2.0, 0.7, 0.5], [0.01, -0.005, 0.004]] {
+                for wanted in [[3.0, 4.0], [-30.0, 1.0], [0.3, -0.02], [1e3, 1e3], [0.0, -5.0], [2.0, 0.0_f32]] {
+                    for limit in [0.01, 1.0, 3.0_f32] {
+                        let f = solve(response, wanted, ratio, limit);
+                        let length = ((f[0] / ratio).powi(2) + f[1] * f[1]).sqrt();
+                        assert!(length <= 1.0002 * limit, "{f:?} is outside");
+                        let found = energy(response, f, wanted);
+                        let best = (0..7200)
+                            .map(|step| {
+                                let angle = step as Real * (std::f32::consts::TAU / 7200.0);
+                                let on = [ratio * limit * libm::cosf(angle), limit * libm::sinf(angle)];
+                                energy(response, on, wanted)
+                            })
+                            .fold(Real::INFINITY as f64, f64::min);
+                        let inside = (wanted[0] / ratio).powi(2) + wanted[1] * wanted[1] < limit * limit;
+                        let least = if inside { 0.0 } else { best };
+                        let scale = energy(response, [0.0; 2], wanted);
+                        let what = format!("ratio {ratio}, {response:?}, wanted {wanted:?}, limit {limit}");
+                        assert!(found <= least + 1e-3 * scale, "{what}: {f:?} leaves {found} of {scale}, not {least}");
+                        // Measured by what friction can change at all.
+                        let change = scale - least;
+                        assert!(scale - found >= 0.99 * change - 1e-6 * scale, "{what}: {f:?} takes {}", scale - found);
+                    }
+                }
+            }
+        }
+    }
+
+    /// No load or absurd numbers push nothing that is not a number.
+    #[test]
+    fn without_load_or_sense_the_ellipse_pushes_nothing() {
+        assert_eq!(solve([1.0, 0.0, 1.0], [3.0, 4.0], 0.1, 0.0), [0.0, 0.0]);
+        for (wanted, limit) in
+            [([1e30, -1e30], 1e-30), ([1e38, 1e38], 1.0), ([1e-30, 1e-38], 1e-38), ([1.0, 1.0], 1e38)]
+        {
+            for ratio in [0.001, 1000.0] {
+                let f = solve([1.0, 0.5, 1.0], wanted, ratio, limit);
+                assert!(f.iter().all(|x| x.is_finite()), "{wanted:?}, {limit}, {ratio}: {f:?}");
+            }
+        }
+    }
 }

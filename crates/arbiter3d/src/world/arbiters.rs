@@ -7,8 +7,8 @@ use super::events::EndEvent;
 use super::pairs::Pair;
 use super::shapes::ShapeSlot;
 use crate::arbiter::{
-    Arbiter, ArbiterId, ArbiterKey, Contact, ContactData, ContactPoint, EndReason, FRICTION_OVERRIDDEN, NONE,
-    RESTITUTION_OVERRIDDEN, ROLLING_OVERRIDDEN, SolveMode, TANGENT_VELOCITY_OVERRIDDEN,
+    ANISOTROPIC, ANISOTROPY_OVERRIDDEN, Arbiter, ArbiterId, ArbiterKey, Contact, ContactData, ContactPoint, EndReason,
+    FRICTION_OVERRIDDEN, NONE, RESTITUTION_OVERRIDDEN, ROLLING_OVERRIDDEN, SolveMode, TANGENT_VELOCITY_OVERRIDDEN,
 };
 use crate::error::{Error, finite_vec, unit_vec};
 use crate::id::BodyId;
@@ -299,7 +299,7 @@ pub(crate) fn mix_shape_materials(pair: &mut Pair, data: &mut ContactData, shape
     let restitution = ma.restitution_combine.max(mb.restitution_combine).combine(ma.restitution, mb.restitution);
     let rolling = max(ma.rolling_resistance, mb.rolling_resistance)
         * rolling_radius([&a.geometry, &b.geometry], [ma, mb].map(|m| m.rolling_resistance));
-    pair.conveyor = [ma, mb].iter().any(|material| material.tangent_velocity != Vec3::ZERO);
+    pair.conveyor = ma.turns() || mb.turns();
     let free = |flag: u8| data.flags & flag == 0;
     let (f, r, t, o) = (
         free(FRICTION_OVERRIDDEN),
@@ -319,6 +319,28 @@ pub(crate) fn mix_shape_materials(pair: &mut Pair, data: &mut ContactData, shape
     if o {
         data.rolling_resistance = rolling;
     }
+    if pair.conveyor || data.flags & ANISOTROPIC != 0 {
+        turn_anisotropy([a, b], pair.bodies.map(|body| bodies[body as usize].pose.rotation), data);
+    }
+}
+
+/// Direction and ratio of the anisotropic friction of an arbiter, if users have not set them: of the two materials that
+/// with the smaller ratio.
+pub(crate) fn turn_anisotropy(shapes: [&ShapeSlot; 2], rotations: [Rotation; 2], data: &mut ContactData) {
+    if data.flags & ANISOTROPY_OVERRIDDEN != 0 {
+        return;
+    }
+    let side = match shapes.map(|shape| shape.material.anisotropy) {
+        [Some(a), Some(b)] => Some(usize::from(b.ratio < a.ratio)),
+        [Some(_), None] => Some(0),
+        [None, Some(_)] => Some(1),
+        [None, None] => None,
+    };
+    let chosen = side.and_then(|side| Some((side, shapes[side].material.anisotropy?)));
+    data.put_anisotropy(chosen.map(|(side, anisotropy)| {
+        let direction = rotations[side].rotate(shapes[side].pose.rotation.rotate(anisotropy.direction));
+        (direction, anisotropy.ratio)
+    }));
 }
 
 /// Velocity of the surface of body 1 against that of body 2, world axes.

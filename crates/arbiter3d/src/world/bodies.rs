@@ -19,6 +19,7 @@ pub(crate) struct Body {
     pub awake: bool,
     pub can_sleep: bool,
     pub continuous: bool,
+    pub bullet: bool,
     /// Went non-finite and was stopped; any change by the user sets it free.
     pub frozen: bool,
     pub kind: BodyKind,
@@ -84,6 +85,7 @@ impl Body {
             awake: false,
             can_sleep: true,
             continuous: true,
+            bullet: false,
             frozen: false,
             kind: BodyKind::Static,
             locked_axes: LockedAxes::NONE,
@@ -271,10 +273,16 @@ impl<'a> BodyRef<'a> {
         self.body().can_sleep
     }
 
-    /// Whether continuous collision stops it at static shapes when it is fast.
+    /// Whether continuous collision looks at it when it is fast.
     #[must_use]
     pub fn is_continuous(&self) -> bool {
         self.body().continuous
+    }
+
+    /// Whether it is a bullet: see [`BodyDefinition::bullet`](crate::BodyDefinition::bullet).
+    #[must_use]
+    pub fn is_bullet(&self) -> bool {
+        self.body().bullet
     }
 
     /// Whether it takes part at all.
@@ -582,6 +590,12 @@ impl<'a> BodyMut<'a> {
     /// Switches continuous collision on or off.
     pub fn set_continuous(&mut self, continuous: bool) {
         self.body().continuous = continuous;
+    }
+
+    /// Makes the body a bullet or an ordinary body: see [`BodyDefinition::bullet`](crate::BodyDefinition::bullet).
+    pub fn set_bullet(&mut self, bullet: bool) {
+        self.body().bullet = bullet;
+        self.world.note_kind(self.id.index);
     }
 
     /// Calls `listener` whenever an arbiter of this body begins, before it is solved.

@@ -1,6 +1,6 @@
 //! How bodies and shapes are asked for.
 
-use crate::error::{Error, finite, finite_vec, in_range, unit_rotation};
+use crate::error::{Error, finite, finite_vec, in_range, unit_rotation, unit_vec};
 use crate::math::{Quat, Real, Vec3};
 use crate::shape::{MassProperties, Shape};
 
@@ -110,8 +110,12 @@ pub struct BodyDefinition {
     pub awake: bool,
     /// Whether the body takes part at all. Default true.
     pub enabled: bool,
-    /// Whether continuous collision stops the body at static shapes when it is fast. Default true.
+    /// Whether continuous collision stops the body at static and kinematic shapes when it is fast. Default true.
     pub continuous: bool,
+    /// Whether the body is a bullet: when it is fast, it meets dynamic bodies too, other bullets included, and bounces off
+    /// within the step, losing no time. Counts while `continuous` is true. A kinematic bullet hits what it sweeps over.
+    /// Default false.
+    pub bullet: bool,
     /// Yours to use. Default 0.
     pub user_data: u128,
 }
@@ -133,6 +137,7 @@ impl Default for BodyDefinition {
             awake: true,
             enabled: true,
             continuous: true,
+            bullet: false,
             user_data: 0,
         }
     }
@@ -246,6 +251,8 @@ pub struct Material {
     pub rolling_resistance: Real,
     /// Velocity of the surface in the body's frame, m/s: a conveyor belt. Default zero.
     pub tangent_velocity: Vec3,
+    /// Less or more friction along one direction of the surface than across it: skis, tracks, wheels. Default none.
+    pub anisotropy: Option<Anisotropy>,
     /// How the frictions of two shapes make one. Default the maximum.
     pub friction_combine: CombineRule,
     /// How the restitutions of two shapes make one. Default the maximum.
@@ -259,6 +266,7 @@ impl Default for Material {
             restitution: 0.0,
             rolling_resistance: Self::DEFAULT_ROLLING_RESISTANCE,
             tangent_velocity: Vec3::ZERO,
+            anisotropy: None,
             friction_combine: CombineRule::Maximum,
             restitution_combine: CombineRule::Maximum,
         }
@@ -273,7 +281,91 @@ impl Material {
         in_range("friction", self.friction, 0.0, 1e6)?;
         in_range("restitution", self.restitution, 0.0, 1.0)?;
         in_range("rolling_resistance", self.rolling_resistance, 0.0, 1e6)?;
-        finite_vec("tangent_velocity", self.tangent_velocity).map(|_| ())
+        finite_vec("tangent_velocity", self.tangent_velocity)?;
+        self.anisotropy.map_or(Ok(()), |anisotropy| anisotropy.validated().map(|_| ()))
+    }
+
+    /// Whether something of it turns with the body, so that arbiters must follow in each step.
+    pub(crate) fn turns(&self) -> bool {
+        self.tangent_velocity != Vec3::ZERO || self.anisotropy.is_some()
+    }
+
+    /// The same with vectors that are directions at exactly unit length.
+    pub(crate) fn normalized(self) -> Self {
+        Self { anisotropy: self.anisotropy.and_then(|anisotropy| anisotropy.validated().ok()), ..self }
+    }
+}
+
+/// Friction that differs along one direction of a surface: an ellipse of friction instead of a circle.
+///
+/// Across the direction a shape has its [`Material::friction`], as combined with that of the other shape; along it,
+/// that times `ratio`. A body slides in the direction in which friction takes most of its motion away: a ski that is
+/// pushed at an angle runs straight on. Of two shapes with an anisotropy each, the one with the smaller ratio decides.
+/// Spinning on the spot meets the friction across.
+///
+/// ```
+/// use arbiter3d::{Anisotropy, Material, math::Vec3};
+/// // A ski along its x axis: friction 0.05 along, 0.5 across.
+/// let ski = Material { anisotropy: Some(Anisotropy::new(Vec3::X, 0.1)), ..Material::default() };
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Anisotropy {
+    /// Unit vector in the shape's frame; what counts is its part along the surface. Where it stands straight up on the
+    /// surface, friction is the same in all directions.
+    pub direction: Vec3,
+    /// Friction along the direction as a share of that across, 0.001 to 1000.
+    pub ratio: Real,
+}
+
+impl Anisotropy {
+    /// Friction along `direction` (unit vector, shape's frame) is `ratio` times that across.
+    #[must_use]
+    pub const fn new(direction: Vec3, ratio: Real) -> Self {
+        Self { direction, ratio }
+    }
+
+    /// The same with an exact unit vector, or what is wrong with it.
+    pub(crate) fn validated(self) -> Result<Self, Error> {
+        let direction = unit_vec("anisotropy direction", self.direction)?;
+        Ok(Self { direction, ratio: in_range("anisotropy ratio", self.ratio, 1e-3, 1e3)? })
+    }
+}
+
+/// What a shape asks to be told of its arbiters beyond their begin and end, as a set. Nothing costs anything until it
+/// is asked for.
+///
+/// ```
+/// use arbiter3d::ContactEvents;
+/// let wanted = ContactEvents::HITS | ContactEvents::PERSIST;
+/// assert!(wanted.contains(ContactEvents::HITS) && !wanted.contains(ContactEvents::PRE_SOLVE));
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct ContactEvents(pub(crate) u8);
+
+impl ContactEvents {
+    /// Begin and end alone.
+    pub const NONE: Self = Self(0);
+    /// Listeners of [`World::on_pre_solve`](crate::World::on_pre_solve) get the arbiters before each solve. Their
+    /// manifolds are made anew in each step.
+    pub const PRE_SOLVE: Self = Self(1);
+    /// A [`PersistEvent`](crate::PersistEvent) in each step in which an arbiter goes on.
+    pub const PERSIST: Self = Self(2);
+    /// A [`HitEvent`](crate::HitEvent) when something hits the shape.
+    pub const HITS: Self = Self(4);
+    /// All of them.
+    pub const ALL: Self = Self(7);
+
+    /// Whether everything in `other` is asked for.
+    #[must_use]
+    pub fn contains(self, other: Self) -> bool {
+        self.0 & other.0 == other.0
+    }
+}
+
+impl std::ops::BitOr for ContactEvents {
+    type Output = Self;
+    fn bitor(self, other: Self) -> Self {
+        Self(self.0 | other.0)
     }
 }
 
@@ -339,6 +431,11 @@ pub struct ShapeDefinition {
     pub filter: Filter,
     /// Whether it only reports what overlaps it and pushes nothing. Default false.
     pub sensor: bool,
+    /// What it asks to be told of its arbiters: the other shape of a pair may ask as well. Default nothing.
+    pub events: ContactEvents,
+    /// The way in which bodies pass through it, a unit vector in the shape's frame: what comes that way goes through,
+    /// what comes the other way stands on it. Default `None`: nothing passes. See [`ShapeDefinition::one_way`].
+    pub one_way: Option<Vec3>,
     /// Yours to use. Default 0.
     pub user_data: u128,
 }
@@ -355,6 +452,8 @@ impl ShapeDefinition {
             material: Material::default(),
             filter: Filter::default(),
             sensor: false,
+            events: ContactEvents::NONE,
+            one_way: None,
             user_data: 0,
         }
     }
@@ -410,10 +509,40 @@ impl ShapeDefinition {
         Self { sensor: true, ..self }
     }
 
+    /// The same with contact events.
+    #[must_use]
+    pub fn events(self, events: ContactEvents) -> Self {
+        Self { events, ..self }
+    }
+
+    /// The same as a platform that bodies pass through along `direction` (unit vector, shape's frame) and stand on from
+    /// the other side. A body that has begun to pass goes on passing until it is out again, whatever turns it
+    /// meanwhile.
+    #[must_use]
+    pub fn one_way(self, direction: Vec3) -> Self {
+        Self { one_way: Some(direction), ..self }
+    }
+
+    /// The same as a conveyor belt: its surface moves at `velocity`, m/s, in the body's frame.
+    #[must_use]
+    pub fn tangent_velocity(mut self, velocity: Vec3) -> Self {
+        self.material.tangent_velocity = velocity;
+        self
+    }
+
+    /// The same with friction that differs along `direction` (unit vector, shape's frame): there it is `ratio` times
+    /// that across.
+    #[must_use]
+    pub fn anisotropy(mut self, direction: Vec3, ratio: Real) -> Self {
+        self.material.anisotropy = Some(Anisotropy::new(direction, ratio));
+        self
+    }
+
     pub(crate) fn validate(&self) -> Result<(), Error> {
         finite_vec("shape position", self.position)?;
         unit_rotation("shape rotation", self.rotation)?;
         in_range("density", self.density, 0.0, 1e12)?;
+        self.one_way.map_or(Ok(()), |way| unit_vec("one_way", way).map(|_| ()))?;
         self.material.validate()
     }
 }

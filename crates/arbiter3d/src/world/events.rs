@@ -1,4 +1,5 @@
-//! What happened: begin and end of arbiters, overlaps of sensors. To listen with closures, or to drain from lists.
+//! What happened: begin and end of arbiters, overlaps of sensors; see `contact_events` for what is told on request. To
+//! listen with closures, or to drain from lists.
 //!
 //! Events raised in a step stand in the lists until the next step begins; those raised between two steps stand until the step
 //! after next begins, so that draining once after each step sees everything. Their order is that of the keys, whatever the
@@ -9,6 +10,7 @@
 
 use super::World;
 use super::bodies::BodyRef;
+use super::contact_events::{Closing, HitEvent, HitListener, PersistEvent, PreSolveListener, Watched};
 use super::shapes::ShapeRef;
 use crate::arbiter::{Arbiter, ArbiterId, ArbiterKey, ContactData, ContactPoint, EndReason, IdMap};
 use crate::error::Error;
@@ -240,6 +242,14 @@ impl<'a> StepContext<'a> {
         self.world.register_contact_by_key(key, body1, body2, contact)
     }
 
+    /// As [`World::set_contact_separation`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn set_contact_separation(&mut self, arbiter: ArbiterId, slot: usize, separation: Real) -> Result<(), Error> {
+        self.world.set_contact_separation(arbiter, slot, separation)
+    }
+
     /// Removes a body at the end of the phase.
     ///
     /// # Errors
@@ -291,6 +301,8 @@ pub(crate) struct ListenerSet {
 #[derive(Default)]
 pub(crate) struct Listeners {
     pub world: ListenerSet,
+    pub pre_solve: Vec<PreSolveListener>,
+    pub hit: Vec<HitListener>,
     bodies: IdMap<u32, ListenerSet>,
 }
 
@@ -367,7 +379,7 @@ impl<T> EventList<T> {
         }
     }
 
-    fn drain(&mut self) -> std::vec::Drain<'_, T> {
+    pub fn drain(&mut self) -> std::vec::Drain<'_, T> {
         self.seen = 0;
         self.events.drain(..)
     }
@@ -379,6 +391,14 @@ pub(crate) struct Events {
     pub begin: EventList<BeginEvent>,
     pub end: EventList<EndEvent>,
     pub sensor: EventList<SensorEvent>,
+    pub persist: EventList<PersistEvent>,
+    pub hit: EventList<HitEvent>,
+    /// Active pairs that ask for something, and whether their arbiters were there before the step.
+    pub watched_pairs: Vec<(u32, bool)>,
+    /// Arbiters of the step that ask for something, by key.
+    pub watched: Vec<Watched>,
+    /// Those of them that close fast.
+    pub closing: Vec<Closing>,
     /// Arbiters whose begin has not been raised.
     pub unbegun: Vec<(ArbiterKey, ArbiterId)>,
     /// Ends whose listeners have not been called.
@@ -399,6 +419,13 @@ impl Events {
         self.begin.begin_step();
         self.end.begin_step();
         self.sensor.begin_step();
+        self.persist.begin_step();
+        self.hit.begin_step();
+    }
+
+    /// Notes an active pair that asks for something.
+    pub fn watch(&mut self, pair: u32, goes_on: bool) {
+        storage::push(&mut self.watched_pairs, (pair, goes_on));
     }
 
     /// Whether no listener has anything to be told.
@@ -410,6 +437,8 @@ impl Events {
         self.begin.end_step();
         self.end.end_step();
         self.sensor.end_step();
+        self.persist.end_step();
+        self.hit.end_step();
         if let Some(count) = self.begin_peak.end_step() {
             storage::shrink(&mut self.unbegun, count);
             storage::shrink(&mut self.spare_unbegun, count);
@@ -469,20 +498,6 @@ impl World {
     /// Takes the sensor events out of their list.
     pub fn drain_sensor_events(&mut self) -> impl Iterator<Item = SensorEvent> + '_ {
         self.events.sensor.drain()
-    }
-
-    /// Shapes inside a sensor now, by id; empty for a shape that is no sensor.
-    #[must_use]
-    pub fn sensor_overlaps(&self, sensor: ShapeId) -> Vec<ShapeId> {
-        let Ok(slot) = self.shape_slot(sensor) else { return Vec::new() };
-        let mut inside: Vec<ShapeId> = self
-            .pairs_of_body(self.shapes[slot as usize].body)
-            .map(|index| &self.pairs[index as usize])
-            .filter(|pair| pair.overlapping && pair.has_shape(slot) && self.shapes[slot as usize].sensor)
-            .map(|pair| self.shapes[pair.shapes[usize::from(pair.shapes[0] == slot)] as usize].id)
-            .collect();
-        inside.sort_unstable();
-        inside
     }
 
     /// Raises the begin of all arbiters that are new, those made by listeners included.

@@ -63,6 +63,7 @@ impl World {
         }
         for slot in 0..self.shapes.len() as u32 {
             self.broad_phase.touch(slot);
+            self.note_still(slot);
         }
         self.flush_events();
     }
@@ -77,19 +78,24 @@ impl World {
     }
 
     pub(crate) fn passes_pair_filter(&self, a: u32, b: u32) -> bool {
-        self.filters.pair.as_ref().is_none_or(|filter| {
-            let (low, high) = if self.shapes[a as usize].id < self.shapes[b as usize].id { (a, b) } else { (b, a) };
-            filter(&self.shape_pair([low, high]))
-        })
-    }
-
-    fn shape_pair(&self, shapes: [u32; 2]) -> ShapePair {
-        let [s1, s2] = shapes.map(|slot| &self.shapes[slot as usize]);
-        ShapePair { shape1: s1.id, shape2: s2.id, body1: self.body_id(s1.body), body2: self.body_id(s2.body) }
+        self.filters.passes_pair((&self.shapes, &self.bodies), [a, b])
     }
 }
 
 impl UserFilters {
+    /// Whether the pair filter lets two shapes collide.
+    pub fn passes_pair(
+        &self,
+        (shapes, bodies): (&[super::shapes::ShapeSlot], &[super::bodies::Body]),
+        pair: [u32; 2],
+    ) -> bool {
+        let Some(filter) = &self.pair else { return true };
+        let [a, b] = pair.map(|slot| &shapes[slot as usize]);
+        let (s1, s2) = if a.id < b.id { (a, b) } else { (b, a) };
+        let id = |index: u32| BodyId { index, generation: bodies[index as usize].generation };
+        filter(&ShapePair { shape1: s1.id, shape2: s2.id, body1: id(s1.body), body2: id(s2.body) })
+    }
+
     /// Whether the manifold counts; the filter may change it.
     pub fn passes_contact(
         &self,
@@ -97,9 +103,18 @@ impl UserFilters {
         context: (&[super::shapes::ShapeSlot], &[super::bodies::Body]),
         manifold: &mut Manifold,
     ) -> bool {
+        self.passes_manifold(context, pair.shapes, manifold)
+    }
+
+    /// The same for two shapes that may have no pair; the first has the smaller id.
+    pub fn passes_manifold(
+        &self,
+        (shapes, bodies): (&[super::shapes::ShapeSlot], &[super::bodies::Body]),
+        slots: [u32; 2],
+        manifold: &mut Manifold,
+    ) -> bool {
         let Some(filter) = &self.contact else { return true };
-        let (shapes, bodies) = context;
-        let [s1, s2] = pair.shapes.map(|slot| &shapes[slot as usize]);
+        let [s1, s2] = slots.map(|slot| &shapes[slot as usize]);
         let id = |index: u32| BodyId { index, generation: bodies[index as usize].generation };
         filter(&ShapePair { shape1: s1.id, shape2: s2.id, body1: id(s1.body), body2: id(s2.body) }, manifold)
     }

@@ -3,13 +3,16 @@
 mod arbiters;
 mod bodies;
 mod collide;
+mod contact_events;
 mod continuous;
 mod definition;
 mod events;
 mod filters;
 mod numbers;
+mod one_way;
 mod pairs;
 mod queries;
+mod sensors;
 mod settings;
 mod shapes;
 mod sleep;
@@ -20,10 +23,14 @@ mod validate;
 pub use crate::error::{Error, UNIT_TOLERANCE};
 pub use crate::id::{BodyId, ShapeId};
 pub use bodies::{BodyMut, BodyRef};
-pub use definition::{BodyDefinition, BodyKind, CombineRule, Filter, LockedAxes, Material, ShapeDefinition};
+pub use contact_events::{HitEvent, HitListener, PersistEvent, PreSolveListener};
+pub use continuous::Impact;
+pub use definition::{
+    Anisotropy, BodyDefinition, BodyKind, CombineRule, ContactEvents, Filter, LockedAxes, Material, ShapeDefinition,
+};
 pub use events::{BeginEvent, BeginListener, ContactProvider, EndEvent, EndListener, SensorEvent, StepContext};
 pub use filters::{ContactFilter, PairFilter, ShapePair};
-pub use queries::{QueryFilter, RayHit};
+pub use queries::{BodyKinds, CastHit, PointHit, QueryFilter, RayHit, ShapeContacts, ShapePredicate};
 pub use settings::WorldSettings;
 pub use shapes::{ShapeMut, ShapeRef};
 pub use step::StepReport;
@@ -104,10 +111,24 @@ pub struct World {
     timings: Timings,
     scratch: step::StepScratch,
     narrow: collide::NarrowPhaseScratch,
+    /// How many shapes are sensors.
+    sensors: u32,
+    /// Static shapes that have come or moved since the last search for pairs: those of two static shapes are found
+    /// apart.
+    still_news: Vec<u32>,
+    /// Pairs of sensors that nobody awake has, and that have to be looked at once.
+    resting_sensors: Vec<u32>,
     wake_scratch: Vec<u32>,
     index_scratch: Vec<u32>,
     /// Where fast bodies stop.
     stops: Vec<Option<Pose>>,
+    /// Kinematic bodies, sorted; and their shapes on their ways, while fast bodies are looked at.
+    kinematic: Vec<u32>,
+    /// Bullets, sorted; and what their flight needs.
+    bullets: Vec<u32>,
+    flight: continuous::FlightScratch,
+    impacts: Vec<Impact>,
+    kinematic_shapes: Vec<continuous::KinematicShape>,
     member_scratch: Vec<(u32, u32)>,
     /// Bodies of new pairs, and whether one is awake.
     tie_scratch: Vec<([u32; 2], bool)>,
@@ -179,9 +200,17 @@ impl World {
             timings: Timings::default(),
             scratch: step::StepScratch::default(),
             narrow: collide::NarrowPhaseScratch::default(),
+            sensors: 0,
+            still_news: Vec::new(),
+            resting_sensors: Vec::new(),
             wake_scratch: Vec::new(),
             index_scratch: Vec::new(),
             stops: Vec::new(),
+            kinematic: Vec::new(),
+            bullets: Vec::new(),
+            flight: continuous::FlightScratch::default(),
+            impacts: Vec::new(),
+            kinematic_shapes: Vec::new(),
             member_scratch: Vec::new(),
             tie_scratch: Vec::new(),
         };
@@ -296,6 +325,7 @@ impl World {
         body.can_sleep = definition.can_sleep;
         body.enabled = definition.enabled;
         body.continuous = definition.continuous;
+        body.bullet = definition.bullet;
         body.user_data = definition.user_data;
         let (linear, angular) = definition.locked_axes.free();
         let state = &mut self.solver_bodies.states[index as usize];
@@ -304,6 +334,7 @@ impl World {
         let motion = &mut self.solver_bodies.motions[index as usize];
         (motion.linear_damping, motion.angular_damping) = (definition.linear_damping, definition.angular_damping);
         self.update_mass(index);
+        self.note_kind(index);
         if definition.awake {
             self.wake(index);
         } else if definition.kind == BodyKind::Dynamic && definition.enabled && definition.can_sleep {
@@ -329,6 +360,7 @@ impl World {
         }
         self.leave_sleep(index);
         self.bodies[index as usize].alive = false;
+        self.note_kind(index);
         self.solver_bodies.reset(index as usize);
         self.flush_events();
         self.listeners.forget_body(index);
@@ -374,6 +406,7 @@ impl World {
                 let near = tight.expand(self.scaled.speculative_distance);
                 if self.broad_phase.update(slot, &near, &tight.expand(self.fat_margin(slot))) {
                     self.note_moved(slot);
+                    self.note_still(slot);
                 }
             }
         }
@@ -399,8 +432,26 @@ impl World {
     /// Manifolds of a body's pairs are made anew in the next step.
     fn forget_manifolds(&mut self, index: u32) {
         let pairs: Vec<u32> = self.pairs_of_body(index).collect();
-        for pair in pairs {
-            self.pairs[pair as usize].has_manifold = false;
+        for index in pairs {
+            let pair = &mut self.pairs[index as usize];
+            pair.has_manifold = false;
+            if pair.sensor && !pair.active {
+                storage::push(&mut self.resting_sensors, index);
+            }
+        }
+    }
+
+    /// Keeps the lists of kinematic bodies and of bullets.
+    fn note_kind(&mut self, index: u32) {
+        let body = &self.bodies[index as usize];
+        let kinematic = body.alive && body.kind == BodyKind::Kinematic;
+        let bullet = body.alive && body.bullet;
+        for (list, listed) in [(&mut self.kinematic, kinematic), (&mut self.bullets, bullet)] {
+            match list.binary_search(&index) {
+                Ok(at) if !listed => drop(list.remove(at)),
+                Err(at) if listed => list.insert(at, index),
+                _ => {}
+            }
         }
     }
 
@@ -413,6 +464,7 @@ impl World {
         }
         self.leave_sleep(index);
         self.bodies[index as usize].kind = kind;
+        self.note_kind(index);
         self.refresh_solver_body(index);
         if self.bodies[index as usize].enabled {
             for &slot in &slots {
@@ -441,15 +493,6 @@ impl World {
             self.bodies[index as usize].enabled = false;
             self.refresh_solver_body(index);
         }
-    }
-
-    /// Notes that shapes overlap a sensor, or no longer do.
-    fn set_sensor_overlap(&mut self, pair_index: u32, begin: bool) {
-        let pair = &mut self.pairs[pair_index as usize];
-        pair.overlapping = begin;
-        let [a, b] = pair.shapes.map(|slot| &self.shapes[slot as usize]);
-        let (sensor, visitor) = if a.sensor { (a.id, b.id) } else { (b.id, a.id) };
-        self.events.sensor.events.push(SensorEvent { sensor, visitor, begin });
     }
 
     /// Largest coordinate of any velocity component, for tests of sanity.

@@ -41,6 +41,8 @@ pub(crate) struct Pair {
     pub overlapping: bool,
     /// Whether `manifold_pose` holds: cleared by teleports and edits.
     pub has_manifold: bool,
+    /// What the shapes ask for beyond contacts: [`WATCHED`], [`ONE_WAY`], [`PASSING`].
+    pub traits: u8,
     pub shapes: [u32; 2],
     /// Middle of the smaller shape when the manifold was made, from the centre of body 2 in the axes of body 1.
     ///
@@ -54,6 +56,19 @@ pub(crate) struct Pair {
     touch_distance: Real,
     pub cache: PairCache,
 }
+
+/// Traits that are those of [`super::definition::ContactEvents`].
+pub(crate) const WATCHED: u8 = 7;
+/// Listeners want the arbiter before each solve: its manifold is made anew in each step.
+pub(crate) const PRE_SOLVE: u8 = 1;
+/// An event in each step in which the arbiter goes on.
+pub(crate) const PERSIST: u8 = 2;
+/// An event for each hit.
+pub(crate) const HITS: u8 = 4;
+/// One of the shapes lets bodies pass one way.
+pub(crate) const ONE_WAY: u8 = 8;
+/// The shapes are passing through each other: no contact until they are out again.
+pub(crate) const PASSING: u8 = 16;
 
 /// How many pairs ahead of its end what a pair touches is asked for.
 const PARTED_AHEAD: usize = 4;
@@ -119,6 +134,12 @@ impl Pair {
     #[inline(always)]
     pub fn closes_slowly(closing: Real, speculative_distance: Real) -> bool {
         closing < 2.0 * (0.25 * speculative_distance)
+    }
+
+    /// What two shapes ask for.
+    pub fn traits_of(shapes: [&ShapeSlot; 2]) -> u8 {
+        let one_way = shapes[0].one_way.is_some() || shapes[1].one_way.is_some();
+        shapes[0].events.0 | shapes[1].events.0 | if one_way { ONE_WAY } else { 0 }
     }
 
     pub fn has_shape(&self, slot: u32) -> bool {
@@ -188,7 +209,7 @@ impl PairRules<'_> {
         match (shape_a.sensor, shape_b.sensor) {
             (true, true) => false,
             (false, false) => dynamic && (shape_a.geometry.is_convex() || shape_b.geometry.is_convex()),
-            _ => kind_a != BodyKind::Static || kind_b != BodyKind::Static,
+            _ => shape_a.geometry.is_convex() || shape_b.geometry.is_convex(),
         }
     }
 }
@@ -218,9 +239,10 @@ impl PairMaker<'_> {
             alive: true,
             active: bodies.iter().any(|&body| self.bodies[body as usize].awake),
             sensor: slots.iter().any(|shape| shape.sensor),
-            conveyor: slots.iter().any(|shape| shape.material.tangent_velocity != Vec3::ZERO),
+            conveyor: slots.iter().any(|shape| shape.material.turns()),
             overlapping: false,
             has_manifold: false,
+            traits: Pair::traits_of(slots),
             manifold_pose: Pose::IDENTITY,
             manifold_rotation: Rotation::IDENTITY,
             manifold_middle: Vec3::ZERO,
@@ -296,6 +318,8 @@ impl World {
             self.pair_lists.link(place, bodies);
             if active {
                 self.active_pairs.insert(place);
+            } else if self.pairs[place as usize].sensor {
+                storage::push(&mut self.resting_sensors, place);
             }
         }
         self.free_pairs.truncate(self.free_pairs.len() - reused);
@@ -347,8 +371,25 @@ impl World {
     }
 
     pub(crate) fn activate_pair(&mut self, index: u32) {
-        self.pairs[index as usize].active = true;
+        let pair = &mut self.pairs[index as usize];
+        if !std::mem::replace(&mut pair.active, true) && pair.traits & WATCHED != 0 {
+            // Woken in the middle of a step: the narrow phase may have gone by.
+            let goes_on = pair.arbiter != NONE;
+            self.events.watch(index, goes_on);
+        }
         self.active_pairs.insert(index);
+    }
+
+    /// What the shapes of a pair ask for has changed.
+    pub(crate) fn refresh_traits(&mut self, slot: u32) {
+        let body = self.shapes[slot as usize].body;
+        let pairs: Vec<u32> =
+            self.pairs_of_body(body).filter(|&pair| self.pairs[pair as usize].has_shape(slot)).collect();
+        for index in pairs {
+            let pair = &mut self.pairs[index as usize];
+            pair.traits = Pair::traits_of(pair.shapes.map(|slot| &self.shapes[slot as usize]));
+            pair.has_manifold = false;
+        }
     }
 
     pub(crate) fn deactivate_pair(&mut self, index: u32) {

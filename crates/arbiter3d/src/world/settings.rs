@@ -38,6 +38,8 @@ pub struct WorldSettings {
     pub push_out_speed: Real,
     /// Approach speed below which nothing bounces. Default 1 m/s.
     pub restitution_threshold: Real,
+    /// Approach speed from which on a contact is a hit: see [`HitEvent`](crate::HitEvent). Default 1 m/s.
+    pub hit_speed_threshold: Real,
     /// Speed limit of bodies. Default 1000 m/s. Spin is limited to 1.5 radians a substep: 360 rad/s at 60 Hz with four.
     pub max_linear_speed: Real,
     /// Whether resting islands may fall asleep. Default true.
@@ -67,6 +69,7 @@ impl Default for WorldSettings {
             contact_damping_ratio: 3.0,
             push_out_speed: 3.0,
             restitution_threshold: 1.0,
+            hit_speed_threshold: 1.0,
             max_linear_speed: 1000.0,
             allow_sleep: true,
             time_to_sleep: 0.5,
@@ -94,6 +97,7 @@ impl WorldSettings {
         in_range("contact_damping_ratio", self.contact_damping_ratio, 0.0, 1e6)?;
         in_range("push_out_speed", self.push_out_speed, 0.0, 1e6)?;
         in_range("restitution_threshold", self.restitution_threshold, 0.0, 1e6)?;
+        in_range("hit_speed_threshold", self.hit_speed_threshold, 0.0, 1e9)?;
         in_range("max_linear_speed", self.max_linear_speed, 1e-6, 1e9)?;
         in_range("time_to_sleep", self.time_to_sleep, 0.0, 1e9)?;
         in_range("sleep_speed", self.sleep_speed, 0.0, 1e9)?;
@@ -113,6 +117,7 @@ impl WorldSettings {
             contact_break_distance: self.contact_break_distance * unit,
             push_out_speed: self.push_out_speed * unit,
             restitution_threshold: self.restitution_threshold * unit,
+            hit_speed_threshold: self.hit_speed_threshold * unit,
             max_linear_speed: self.max_linear_speed * unit,
             sleep_speed: self.sleep_speed * unit,
             ..*self

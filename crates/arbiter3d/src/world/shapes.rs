@@ -1,10 +1,10 @@
 //! Shapes on bodies: what the world keeps of them, and how users read and change them.
 
 use super::World;
-use super::definition::{BodyKind, Filter, Material, ShapeDefinition};
+use super::definition::{BodyKind, ContactEvents, Filter, Material, ShapeDefinition};
 use crate::arbiter::{EndReason, NONE};
 use crate::broad_phase::TreeKind;
-use crate::error::{Error, unit_rotation};
+use crate::error::{Error, unit_rotation, unit_vec};
 use crate::id::{BodyId, ShapeId};
 use crate::math::{Aabb, Pose, Quat, Real, Vec3};
 use crate::place_table::mix;
@@ -28,11 +28,14 @@ pub(crate) struct ShapeSlot {
     /// Distance of the farthest point of the shape from that middle.
     pub reach: Real,
     pub sensor: bool,
+    pub events: ContactEvents,
     /// Where the shape's frame sits on the body.
     pub pose: Pose,
     pub density: Real,
     pub material: Material,
     pub filter: Filter,
+    /// The way in which bodies pass through it, in its frame, of unit length.
+    pub one_way: Option<Vec3>,
     pub user_data: u128,
 }
 
@@ -147,6 +150,18 @@ impl<'a> ShapeRef<'a> {
         self.slot.sensor
     }
 
+    /// What it asks to be told of its arbiters.
+    #[must_use]
+    pub fn events(&self) -> ContactEvents {
+        self.slot.events
+    }
+
+    /// The way in which bodies pass through it, a unit vector in its frame.
+    #[must_use]
+    pub fn one_way(&self) -> Option<Vec3> {
+        self.slot.one_way
+    }
+
     /// Yours.
     #[must_use]
     pub fn user_data(&self) -> u128 {
@@ -170,14 +185,20 @@ impl<'a> ShapeMut<'a> {
     }
 
     /// Changes the surface. Live arbiters of the shape follow in the next step, but for what users have set on them.
+    /// Where the surface moves at another speed than before, what touches it wakes.
     ///
     /// # Errors
     /// If a number is not finite or out of its range.
     pub fn set_material(&mut self, material: Material) -> Result<(), Error> {
         material.validate()?;
-        self.slot().material = material;
+        let old = std::mem::replace(&mut self.slot().material, material.normalized());
         let body = self.slot().body;
         self.world.refresh_materials_of(body);
+        if old.tangent_velocity != material.tangent_velocity {
+            // A belt that is switched on carries off what sleeps on it.
+            self.world.wake_neighbours(body);
+            self.world.wake(body);
+        }
         Ok(())
     }
 
@@ -192,11 +213,32 @@ impl<'a> ShapeMut<'a> {
     pub fn set_sensor(&mut self, sensor: bool) {
         if self.slot().sensor != sensor {
             self.slot().sensor = sensor;
+            self.world.sensors = if sensor { self.world.sensors + 1 } else { self.world.sensors - 1 };
             let body = self.slot().body;
             self.world.renew_proxy(self.slot, EndReason::FilterChanged);
             self.world.update_mass(body);
             self.world.flush_events();
         }
+    }
+
+    /// Changes what it asks to be told of its arbiters, from the next step on.
+    pub fn set_events(&mut self, events: ContactEvents) {
+        self.slot().events = events;
+        self.world.refresh_traits(self.slot);
+    }
+
+    /// Makes it a platform that bodies pass through along a unit vector in its frame, or solid from all sides. What
+    /// stands on it goes on standing, what is passing is judged anew.
+    ///
+    /// # Errors
+    /// If the vector is not finite and of unit length.
+    pub fn set_one_way(&mut self, one_way: Option<Vec3>) -> Result<(), Error> {
+        self.slot().one_way = one_way.map(|way| unit_vec("one_way", way)).transpose()?;
+        self.world.refresh_traits(self.slot);
+        let body = self.slot().body;
+        self.world.forget_manifolds(body);
+        self.world.wake(body);
+        Ok(())
     }
 
     /// Changes the density, kg/m³, and with it the mass of the body.
@@ -245,9 +287,11 @@ impl World {
             reach: definition.shape.reach_from(definition.shape.local_aabb().center()),
             geometry: definition.shape.clone(),
             density: definition.density,
-            material: definition.material,
+            material: definition.material.normalized(),
             filter: definition.filter,
             sensor: definition.sensor,
+            events: definition.events,
+            one_way: definition.one_way.map(|way| way / way.length()),
             user_data: definition.user_data,
         };
         let slot = if let Some(slot) = self.free_shapes.pop() {
@@ -258,6 +302,7 @@ impl World {
             self.moved_shapes.push(false);
             (self.shapes.len() - 1) as u32
         };
+        self.sensors += u32::from(definition.sensor);
         let shapes = &self.shapes;
         self.shape_slots.insert(mix(0, id.0), slot, |slot| mix(0, shapes[slot as usize].id.0));
         let owner = &mut self.bodies[index as usize];
@@ -304,6 +349,7 @@ impl World {
         let hash = |slot: u32| mix(0, shapes[slot as usize].id.0);
         self.shape_slots.remove(hash(slot), slot, hash);
         self.shapes[slot as usize].body = NONE;
+        self.sensors -= u32::from(self.shapes[slot as usize].sensor);
         self.free_shapes.push(slot);
     }
 
@@ -336,6 +382,7 @@ impl World {
             BodyKind::Kinematic | BodyKind::Dynamic => TreeKind::Moving,
         };
         self.broad_phase.add(slot, kind, fat);
+        self.note_still(slot);
     }
 
     /// Takes a shape out of the broad phase with all its pairs.
@@ -361,6 +408,7 @@ impl World {
             self.remove_pair(pair, EndReason::FilterChanged);
         }
         self.broad_phase.touch(slot);
+        self.note_still(slot);
         self.wake(body);
     }
 

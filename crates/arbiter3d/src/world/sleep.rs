@@ -169,12 +169,13 @@ impl World {
         }
     }
 
-    /// Whether a moving kinematic body touches this one.
+    /// Whether a moving kinematic body or a running belt touches this one: however slowly they move, it goes on.
     fn is_carried(&self, body: u32) -> bool {
         self.arbiters.of_body(body).any(|index| {
             let arbiter = self.arbiters.at(index);
             let other = if arbiter.body1.index == body { arbiter.body2.index } else { arbiter.body1.index };
-            self.bodies[other as usize].kind == BodyKind::Kinematic && self.bodies[other as usize].awake
+            let runs = arbiter.data.tangent_velocity != Vec3::ZERO;
+            runs || self.bodies[other as usize].kind == BodyKind::Kinematic && self.bodies[other as usize].awake
         })
     }
 

@@ -3,13 +3,14 @@
 use super::World;
 use super::bodies::world_inverse_inertia;
 use super::collide::shapes_overlap;
+use super::continuous::{FastBody, KinematicBody};
 use super::pairs::PairRules;
 use super::timings::{Phase, PhaseClock, Timings};
 use crate::arbiter::{Arbiter, Entry, NONE};
 use crate::broad_phase::Boxes;
 use crate::error::{Error, in_range};
 use crate::id::BodyId;
-use crate::math::{Aabb, Real, Vec3, min};
+use crate::math::{Aabb, Pose, Real, Vec3, min};
 use crate::parallel::{BlockList, Gather, SharedSlice};
 use crate::solver::{
     BodyMass, BodyMotion, BodyState, IntegrateParameters, IntegrateTarget, Integration, Pass, PassParameters,
@@ -62,7 +63,11 @@ pub struct StepReport {
 #[derive(Clone, Copy, Debug)]
 enum BodyNews {
     /// The body may have passed through something.
-    Fast(u32),
+    Fast(FastBody),
+    /// The same of a bullet.
+    Bullet(FastBody),
+    /// The body has moved, and there are bullets.
+    Moved(FastBody),
     /// The body went non-finite.
     Broken(u32),
 }
@@ -76,7 +81,11 @@ pub(crate) struct StepScratch {
     shared: bool,
     news: Gather<BodyNews>,
     /// Bodies that may have passed something.
-    fast: Vec<u32>,
+    fast: Vec<FastBody>,
+    /// Bullets that may have, and the other bodies that have moved while there are bullets.
+    bullets: Vec<FastBody>,
+    movers: Vec<FastBody>,
+    kinematic: Vec<KinematicBody>,
     /// Shapes whose boxes have left their fat boxes in this step, then all that have since the last narrow phase.
     left: Gather<u32>,
     moved: Vec<u32>,
@@ -112,6 +121,7 @@ impl World {
             return Ok(report);
         }
         self.dt = dt;
+        self.impacts.clear();
         if self.is_at_rest() {
             self.events.begin_step();
             self.events.end_step();
@@ -133,7 +143,9 @@ impl World {
         self.call_providers();
         clock.mark(Phase::NarrowPhase);
         self.raise_begin();
+        self.raise_pre_solve();
         self.admit_woken();
+        self.note_closing();
         clock.mark(Phase::BeginEvents);
         self.plan_rows();
         clock.mark(Phase::Coloring);
@@ -142,10 +154,13 @@ impl World {
         self.solve(dt);
         clock.mark(Phase::Solve);
         self.store_rows();
+        let hits = self.events.hit.events.len();
+        self.note_hits();
         clock.mark(Phase::Store);
         self.finalize(dt, &mut report);
         clock.mark(Phase::Finalize);
         self.end_broken();
+        self.raise_hits(hits);
         self.flush_events();
         clock.mark(Phase::EndEvents);
         self.sleep_islands();
@@ -169,6 +184,7 @@ impl World {
             && self.arbiters.are_asleep()
             && !self.broad_phase.has_moved()
             && self.scratch.moved.is_empty()
+            && self.resting_sensors.is_empty()
             && self.providers.is_empty()
             && self.removals.is_empty()
             && self.events.are_told()
@@ -234,6 +250,9 @@ impl World {
         }
         let mut found = std::mem::take(&mut self.scratch.pairs);
         self.search_pairs(&mut found);
+        if !self.still_news.is_empty() {
+            self.find_still_sensors(&mut found);
+        }
         found.retain(|&(a, b)| self.passes_pair_filter(a, b));
         self.add_pairs(&found);
         found.clear();
@@ -365,9 +384,13 @@ impl World {
         // Threads report in any order; the report must not depend on it.
         news.sort_unstable_by_key(|item| match *item {
             BodyNews::Broken(body) => (0, body),
-            BodyNews::Fast(body) => (1, body),
+            BodyNews::Fast(fast) => (1, fast.index),
+            BodyNews::Bullet(fast) => (2, fast.index),
+            BodyNews::Moved(fast) => (3, fast.index),
         });
         let mut fast = std::mem::take(&mut self.scratch.fast);
+        let mut bullets = std::mem::take(&mut self.scratch.bullets);
+        let mut movers = std::mem::take(&mut self.scratch.movers);
         for item in news.drain(..) {
             match item {
                 BodyNews::Broken(body) => {
@@ -375,21 +398,28 @@ impl World {
                     report.frozen.push(self.body_id(body));
                 }
                 BodyNews::Fast(body) => fast.push(body),
+                BodyNews::Bullet(body) => bullets.push(body),
+                BodyNews::Moved(body) => movers.push(body),
             }
         }
         self.stop_at_impacts(&fast);
-        fast.clear();
-        self.scratch.fast = fast;
+        self.fly_bullets(&bullets, &movers);
+        [&mut fast, &mut bullets, &mut movers].into_iter().for_each(Vec::clear);
+        (self.scratch.fast, self.scratch.bullets, self.scratch.movers) = (fast, bullets, movers);
         self.scratch.news = gather;
     }
 
     fn finalize_bodies(&mut self, dt: Real, news: &Gather<BodyNews>, left: &Gather<u32>) {
+        let mut kinematic = std::mem::take(&mut self.scratch.kinematic);
+        self.list_kinematic_bodies(&mut kinematic);
         let awake = &self.scratch.sorted_awake;
         let world = FinalizeContext {
             shapes: &self.shapes,
             boxes: self.broad_phase.boxes(),
             moved: SharedSlice::new(&mut self.moved_shapes),
             settings: &self.scaled,
+            any_bullets: !self.bullets.is_empty(),
+            kinematic: &kinematic,
             dt,
         };
         let rested = AtomicBool::new(false);
@@ -413,6 +443,7 @@ impl World {
             }
         });
         self.scratch.any_rested = rested.into_inner();
+        self.scratch.kinematic = kinematic;
     }
 
     /// Puts a body that went non-finite back to its last finite pose and stops it.
@@ -517,6 +548,10 @@ struct FinalizeContext<'a> {
     /// By shape: whether its proxy has moved.
     moved: SharedSlice<'a, bool>,
     settings: &'a super::WorldSettings,
+    /// Whether there are bullets.
+    any_bullets: bool,
+    /// The kinematic bodies.
+    kinematic: &'a [KinematicBody],
     dt: Real,
 }
 
@@ -536,11 +571,12 @@ impl FinalizeContext<'_> {
             news.push(BodyNews::Broken(index));
             return;
         }
-        mass.center = center;
+        let began = std::mem::replace(&mut mass.center, center);
         let rotation = mass.rotation.to_mat3();
         if body.is_dynamic() && !body.frozen {
             mass.inverse_inertia = world_inverse_inertia(&rotation, motion, body.locked_axes.free().1);
         }
+        let start = Pose::new(began, body.pose.rotation);
         body.pose.rotation = mass.rotation;
         body.pose.position = center - rotation * body.mass.center;
         let speed = state.linear_velocity.length() + body.surface_speed(rotation.transpose() * state.angular_velocity);
@@ -548,15 +584,49 @@ impl FinalizeContext<'_> {
             if motion.kinematic > 0.0 { speed == 0.0 } else { body.can_sleep && speed < self.settings.sleep_speed };
         body.sleep_time = if rests { body.sleep_time + self.dt } else { 0.0 };
         let traveled = state.translation.length() + state.turn.length() * (body.reach - body.inner_radius);
-        let fast = self.settings.continuous && body.continuous && motion.kinematic == 0.0;
-        if fast && traveled > 0.5 * body.inner_radius && self.meets_static(body, center, state.translation) {
-            news.push(BodyNews::Fast(index));
+        if self.settings.continuous && traveled > self.least_way(body) {
+            self.note_fast(&FastBody { index, start }, body, (state, traveled), news);
         }
         for &slot in &body.shape_slots {
             let shape = &self.shapes[slot as usize];
             let lever = if shape.centered { Vec3::ZERO } else { rotation * shape.middle };
             let velocity = state.linear_velocity + state.angular_velocity.cross(lever);
             self.update_box(slot, body, velocity * self.dt, left);
+        }
+    }
+
+    /// How far a body has to move to be noticed: half its inner radius, less where bullets have to know where it was.
+    #[inline(always)]
+    fn least_way(&self, body: &super::bodies::Body) -> Real {
+        let own = 0.5 * body.inner_radius;
+        if self.any_bullets { min(self.settings.slop, own) } else { own }
+    }
+
+    /// Tells of a body that may have passed through something.
+    #[cold]
+    fn note_fast(
+        &self,
+        fast: &FastBody,
+        body: &super::bodies::Body,
+        (state, traveled): (&BodyState, Real),
+        news: &mut BlockList<'_, BodyNews>,
+    ) {
+        let thickness = 0.5 * body.inner_radius;
+        let swept = body.continuous && traveled > thickness;
+        if body.bullet && swept {
+            news.push(BodyNews::Bullet(*fast));
+            return;
+        }
+        if self.any_bullets {
+            news.push(BodyNews::Moved(*fast));
+        }
+        let center = fast.start.position + state.translation;
+        let passed = |other: &KinematicBody| other.may_be_passed(center, (traveled, body.reach, thickness));
+        if body.is_dynamic()
+            && swept
+            && (self.meets_static(body, center, state.translation) || self.kinematic.iter().any(passed))
+        {
+            news.push(BodyNews::Fast(*fast));
         }
     }
 

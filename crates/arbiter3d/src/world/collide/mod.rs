@@ -17,7 +17,7 @@ use super::World;
 use super::arbiters::{fresh_data, mix_shape_materials};
 use super::bodies::Body;
 use super::filters::UserFilters;
-use super::pairs::Pair;
+use super::pairs::{PRE_SOLVE, Pair};
 use super::settings::WorldSettings;
 use super::shapes::ShapeSlot;
 use crate::arbiter::{Arbiter, ArbiterId, ArbiterKey, ContactData, NONE, Name};
@@ -46,6 +46,8 @@ enum News {
     Sensor(u32, bool),
     /// The arbiter has no contacts.
     Empty(u32),
+    /// The shapes ask to be told something of their arbiter, and whether they have one.
+    Watched(u32, bool),
 }
 
 /// A pair whose shapes begin to touch.
@@ -96,6 +98,7 @@ impl World {
         scratch.news.prepare(self.pool.threads(), PAIRS_PER_BLOCK);
         scratch.begins.prepare(self.pool.threads(), PAIRS_PER_BLOCK);
         scratch.blocks.clear();
+        self.events.watched_pairs.clear();
         let blocks = self.active_pairs.words().chunks(WORDS_PER_BLOCK).enumerate();
         scratch.blocks.extend(blocks.filter(|(_, words)| words.iter().any(|&word| word != 0)).map(|(i, _)| i as u32));
         match self.level {
@@ -118,9 +121,11 @@ impl World {
                 News::Apart(pair) => scratch.apart.push(pair),
                 News::Sensor(pair, overlaps) => scratch.sensors.push((pair, overlaps)),
                 News::Empty(arbiter) => scratch.empty.push(arbiter),
+                News::Watched(pair, goes_on) => self.events.watch(pair, goes_on),
             }
         }
         // Threads report in any order; events and places must not depend on it.
+        self.test_resting_sensors(&mut scratch.sensors);
         scratch.sensors.sort_unstable_by_key(|&(pair, _)| self.pair_key(pair));
         for (pair, overlaps) in scratch.sensors.drain(..) {
             self.set_sensor_overlap(pair, overlaps);
@@ -168,11 +173,6 @@ impl World {
         });
     }
 
-    fn pair_key(&self, pair: u32) -> ArbiterKey {
-        let [a, b] = self.pairs[pair as usize].shapes.map(|slot| self.shapes[slot as usize].id);
-        ArbiterKey::of_shapes(a, b)
-    }
-
     /// Makes the arbiters of the pairs that begin to touch, by key.
     fn begin_pairs(&mut self, begins: &mut Vec<Begin>, order: &mut Vec<(ArbiterKey, u32)>) {
         order.extend(begins.iter().zip(0..).map(|(begin, place)| (begin.key, place)));
@@ -200,6 +200,10 @@ impl World {
         if [arbiter.body1, arbiter.body2] == ids {
             let filler = Filler::new((&self.shapes, &self.bodies), &self.solver_bodies, &self.scaled, &self.filters);
             let pair = &mut self.pairs[begin.pair as usize];
+            if arbiter.pair == NONE {
+                self.arbiters.custom -= 1; // it ends with its pair now
+            }
+            let arbiter = self.arbiters.at_mut(index);
             (arbiter.pair, pair.arbiter) = (begin.pair, index);
             filler.fill(begin, pair, &mut arbiter.data);
         }
@@ -264,7 +268,7 @@ impl<'a> Filler<'a> {
     fn fill(&self, begin: &Begin, pair: &mut Pair, data: &mut ContactData) {
         let rotations = begin.bodies.map(|body| self.masses[body as usize].rotation);
         update_contacts(data, &begin.places, rotations, self.break_distance);
-        pair.has_manifold = self.reusable;
+        pair.has_manifold = self.reusable && pair.traits & PRE_SOLVE == 0;
         mix_shape_materials(pair, data, self.shapes, self.bodies);
     }
 }
