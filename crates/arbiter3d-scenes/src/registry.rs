@@ -168,6 +168,12 @@ pub static SCENES: &[Scene] = &[
         build: scenes::piles::convex_vs_mesh,
     },
     Scene {
+        name: "shape_parade",
+        description: "every convex kind of shape rains on a wavy mesh",
+        size: Size::new("bodies", 192, 100_000),
+        build: scenes::parade::shape_parade,
+    },
+    Scene {
         name: "mesh_rain",
         description: "2,048 mixed bodies rain on a wavy mesh",
         size: Size::new("bodies", 2048, 1_000_000),

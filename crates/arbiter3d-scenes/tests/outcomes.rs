@@ -185,6 +185,18 @@ fn nothing_wakes_in_an_idle_world() {
     assert_eq!(scene.world.hash(), hash);
 }
 
+/// Every kind of shape comes to rest on the waves: above them, hardly sunk in, asleep.
+#[test]
+fn the_shape_parade_comes_to_rest() {
+    let mut scene = built("shape_parade");
+    run(&mut scene, 900);
+    let world = &scene.world;
+    let lowest = positions(world).iter().fold(f32::MAX, |low, p| low.min(p.y));
+    assert!(lowest > -0.4, "{lowest} is below the waves' lowest point");
+    assert!(world.deepest_penetration() < 0.02, "{}", world.deepest_penetration());
+    assert!(world.awake_count() <= 2, "{} are awake", world.awake_count());
+}
+
 /// What is thrown up through one-way platforms stands on the floor that it was thrown at, and the lift carries its
 /// load.
 #[test]

@@ -1,4 +1,4 @@
-//! The same bits for any number of threads and any SIMD level: nine scenes against checked-in hashes.
+//! The same bits for any number of threads and any SIMD level: ten scenes against checked-in hashes.
 //!
 //! The state hash is taken after each tenth step and folded into one number a scene. After a change that is meant to alter
 //! results, print the new table with
@@ -19,7 +19,7 @@ use arbiter3d::{
 use common::*;
 
 /// The hashes of the scenes, in their order.
-const GOLDEN: [(&str, u64); 9] = [
+const GOLDEN: [(&str, u64); 10] = [
     ("pile", 0xaac7_fc32_c6dd_5cd4),
     ("hulls", 0x7d4f_1a72_0999_6ad2),
     ("mesh rain", 0x5dbb_e991_fd15_42a9),
@@ -29,6 +29,7 @@ const GOLDEN: [(&str, u64); 9] = [
     ("surfaces", 0x3d59_6268_6154_9bc5),
     ("rods and bullets", 0x945b_21b6_158d_4406),
     ("compounds and voxels", 0xc6bf_573a_b3da_da05),
+    ("mixed convex", 0x8633_67e6_2396_4c38),
 ];
 
 /// A scene: how it begins, and what is done before each step.
@@ -39,7 +40,7 @@ struct Scene {
     before_step: fn(&mut World, usize),
 }
 
-const SCENES: [Scene; 9] = [
+const SCENES: [Scene; 10] = [
     Scene { name: "pile", steps: 180, build: pile, before_step: |_, _| {} },
     Scene { name: "hulls", steps: 150, build: hulls, before_step: |_, _| {} },
     Scene { name: "mesh rain", steps: 180, build: mesh_rain, before_step: |_, _| {} },
@@ -49,6 +50,7 @@ const SCENES: [Scene; 9] = [
     Scene { name: "surfaces", steps: 180, build: surfaces, before_step: ask_for_surfaces },
     Scene { name: "rods and bullets", steps: 120, build: rods_and_bullets, before_step: |_, _| {} },
     Scene { name: "compounds and voxels", steps: 150, build: compounds_and_voxels, before_step: |_, _| {} },
+    Scene { name: "mixed convex", steps: 180, build: mixed_convex, before_step: |_, _| {} },
 ];
 
 /// Bodies of all shapes on a lattice over the origin, each turned and moving at random.
@@ -291,6 +293,40 @@ fn ask_for_surfaces(world: &mut World, _: usize) {
     }
 }
 
+/// Kinds known by their support, with boxes and balls among them, half on hills and half on a level floor.
+fn mixed_convex(world: &mut World) {
+    floor(world, 0.6);
+    let corner = |i: u32, j: u32| {
+        Vec3::new(i as f32 * 2.0 - 9.0, if (i + j).is_multiple_of(2) { 0.4 } else { 0.05 }, j as f32 * 2.0)
+    };
+    let vertices = (0..60).map(|at| corner(at % 10, at / 10)).collect();
+    let cell = |at: u32| at / 9 * 10 + at % 9;
+    let hills = (0..45).flat_map(|at| {
+        let c = cell(at);
+        [[c, c + 10, c + 1], [c + 1, c + 10, c + 11]]
+    });
+    let hills = Shape::mesh(vertices, hills.collect()).unwrap();
+    world.add_shape(BodyId::WORLD, &ShapeDefinition::new(hills)).unwrap();
+    let mut random = Random(47);
+    let block = cuboid(0.3, 0.2, 0.25);
+    let shapes = [
+        Shape::cylinder(0.3, 0.25).unwrap(),
+        Shape::cone(0.35, 0.3).unwrap(),
+        Shape::tapered_capsule(0.3, 0.15, 0.25).unwrap(),
+        Shape::ellipsoid(Vec3::new(0.4, 0.25, 0.3)).unwrap(),
+        Shape::rounded(&block, 0.05).unwrap(),
+        Shape::point_cloud(&[Vec3::X, Vec3::Y, Vec3::Z, -Vec3::ONE].map(|p| p * 0.4)).unwrap(),
+        block,
+        sphere(0.3),
+    ];
+    for at in 0..160 {
+        let place = Vec3::new((at % 8) as f32 - 3.5, (at / 64) as f32 + 1.0, (at / 8 % 8) as f32 - 3.5) * 1.1;
+        let body = BodyDefinition::dynamic().at(place).rotated(random.rotation());
+        let body = body.moving(random.vector(1.0), random.vector(3.0));
+        add(world, &body, &ShapeDefinition::new(shapes[at % 8].clone()));
+    }
+}
+
 fn settings(threads: usize, simd: SimdLevel) -> WorldSettings {
     WorldSettings { threads, simd: Some(simd), ..WorldSettings::default() }
 }
@@ -409,10 +445,16 @@ fn golden_rods_and_bullets() {
     check(7);
 }
 
+/// Cylinders, cones and other shapes known by their support, on a floor and on a mesh.
+#[test]
+fn golden_mixed_convex() {
+    check(9);
+}
+
 /// The scenes do what they are for: they have contacts, sleepers and motion.
 #[test]
 fn the_scenes_are_worth_hashing() {
-    for (scene, contacts) in SCENES.iter().zip([500, 300, 400, 50, 150, 100, 150, 5, 200]) {
+    for (scene, contacts) in SCENES.iter().zip([500, 300, 400, 50, 150, 100, 150, 5, 200, 150]) {
         let mut world = World::new(settings(1, SimdLevel::best())).unwrap();
         let hashes = play(&mut world, scene);
         let found = world.contact_count();

@@ -8,6 +8,7 @@ pub(crate) mod fast;
 pub(crate) mod fields;
 pub(crate) mod fluids;
 pub(crate) mod gears_and_tiles;
+pub(crate) mod parade;
 pub(crate) mod piles;
 pub(crate) mod stacks;
 pub(crate) mod surfaces;

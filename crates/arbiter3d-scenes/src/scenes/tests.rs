@@ -27,6 +27,7 @@ fn scenes_have_their_published_counts() {
         ("washer", None, 8000),
         ("rotating_cube", None, 8000),
         ("convex_vs_mesh", None, 1764),
+        ("shape_parade", None, 192),
         ("mesh_rain", None, 2048),
         ("mesh_rain10k", None, 10_000),
         ("compound_rain", None, 512),

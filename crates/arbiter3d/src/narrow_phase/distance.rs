@@ -27,6 +27,8 @@ const TOUCHING: f64 = 1e-9;
 const FLAT: f64 = 1e-10;
 /// The search ends when a new extreme point gains less than this share of the distance.
 const GAIN: f64 = 1e-12;
+/// Round cores come closer by ever less: the direction is good to a hundred thousandth then.
+const ROUND_GAIN: f64 = 1e-10;
 /// Polyhedra of 255 corners need less than 20 rounds; the cap is for rounding that goes in circles.
 const MAX_ROUNDS: usize = 64;
 
@@ -60,7 +62,39 @@ struct Simplex {
 
 /// Closest points of two cores, `pose` placing shape 2 in the frame of shape 1; `None` where the cores overlap.
 pub(crate) fn closest(shape1: &Support, shape2: &Support, pose: &Pose) -> Option<Closest> {
-    let placed = Placed::new(shape1, shape2, pose);
+    let Nearness::Gap(Gap { point1, way }) = search(&Placed::new(shape1, shape2, pose), f64::INFINITY) else {
+        return None;
+    };
+    let distance = way.length();
+    Some(Closest {
+        point1: point1.as_vec3(),
+        point2: (point1 + way).as_vec3(),
+        normal: unit(way / distance),
+        distance: distance as Real,
+    })
+}
+
+/// The closest points of two cores as found, not rounded.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Gap {
+    /// On the core of shape 1.
+    pub(super) point1: DVec3,
+    /// From there to the core of shape 2; never zero.
+    pub(super) way: DVec3,
+}
+
+/// How two cores lie.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Nearness {
+    /// Farther apart than was asked for.
+    Beyond,
+    Gap(Gap),
+    Overlap,
+}
+
+/// The search for [`closest`], given up once a direction shows a gap beyond `limit`.
+fn search(placed: &Placed<'_>, limit: f64) -> Nearness {
+    let gain = if placed.is_round() { ROUND_GAIN } else { GAIN };
     let mut simplex = Simplex::default();
     let mut v = placed.position;
     if v.length_squared() == 0.0 {
@@ -69,39 +103,47 @@ pub(crate) fn closest(shape1: &Support, shape2: &Support, pose: &Pose) -> Option
     let mut point1 = DVec3::ZERO;
     let mut size = 0.0;
     let mut shortest = f64::MAX;
+    // Whether some direction has shown a gap: without one, a search that ends by rounding ends inside.
+    let mut apart = false;
     for _ in 0..MAX_ROUNDS {
         let corner = placed.corner(-v);
         let w = corner.difference;
         size = larger(size, w.length_squared());
         let squared = v.length_squared();
+        let along = v.dot(w);
+        if along > 0.0 {
+            apart = true;
+            if along * along > limit * limit * squared {
+                return Nearness::Beyond;
+            }
+        }
         let repeated = simplex.corners[..simplex.count].iter().any(|c| c.difference == w);
-        if simplex.count > 0 && (repeated || squared - v.dot(w) <= GAIN * squared) {
+        if simplex.count > 0 && (repeated || squared - along <= gain * squared) {
             break;
         }
         simplex.push(corner);
-        if !simplex.reduce() {
-            if v.dot(w) > 0.0 {
+        let Some(mut feature) = simplex.nearest_feature() else {
+            if along > 0.0 {
                 break; // All corners are on one side of the origin: a tetrahedron that holds it is flat, and rounding.
             }
-            return None;
+            return Nearness::Overlap;
+        };
+        if simplex.squared(&feature) >= shortest {
+            // Of corners that almost coincide the regions are rounding: the nearest of all faces, edges and corners is not.
+            feature = simplex.nearest_of_all();
         }
+        if simplex.squared(&feature) >= shortest {
+            break;
+        }
+        simplex.keep(&feature);
         let nearer = simplex.point();
         let squared = nearer.length_squared();
         if squared <= TOUCHING * TOUCHING * size {
-            return None;
-        }
-        if squared >= shortest {
-            break; // Rounding: no closer any more. A simplex of corners that almost coincide can even be farther.
+            return Nearness::Overlap;
         }
         (v, point1, shortest) = (nearer, simplex.witness(), squared);
     }
-    let distance = v.length();
-    Some(Closest {
-        point1: point1.as_vec3(),
-        point2: (point1 + v).as_vec3(),
-        normal: unit(v / distance),
-        distance: distance as Real,
-    })
+    if apart { Nearness::Gap(Gap { point1, way: v }) } else { Nearness::Overlap }
 }
 
 /// To `f32`, still of unit length.
@@ -128,13 +170,49 @@ impl<'a> Placed<'a> {
         Self { shape1, shape2, rotation, position: pose.position.as_dvec3() }
     }
 
+    /// The same pair with shape 2 moved.
+    pub(super) fn moved(&self, by: DVec3) -> Self {
+        Self { position: self.position + by, ..*self }
+    }
+
+    /// Whether one of the shapes has a round core, so that no few corners make their difference.
+    pub(super) fn is_round(&self) -> bool {
+        self.shape1.has_round_core() || self.shape2.has_round_core()
+    }
+
+    /// The smaller of the shapes' sizes.
+    pub(super) fn size(&self) -> f64 {
+        let (a, b) = (self.shape1.size(), self.shape2.size());
+        f64::from(if a < b { a } else { b })
+    }
+
+    /// Where shape 2 is.
+    pub(super) fn position(&self) -> DVec3 {
+        self.position
+    }
+
+    /// The closest points, unless the cores are apart by more than `limit` (zero or more) or overlap.
+    pub(super) fn nearness(&self, limit: f64) -> Nearness {
+        search(self, limit)
+    }
+
+    /// How far the surfaces are from the cores.
+    pub(super) fn radii(&self) -> [f64; 2] {
+        [self.shape1.radius().into(), self.shape2.radius().into()]
+    }
+
+    /// Puts a point of shape 2 into the frame of shape 1.
+    pub(super) fn place(&self, point: DVec3) -> DVec3 {
+        let m = &self.rotation;
+        m.x_axis * point.x + m.y_axis * point.y + m.z_axis * point.z + self.position
+    }
+
     /// The extreme point of the difference along `direction`.
     pub(super) fn corner(&self, direction: DVec3) -> Corner {
         let point1 = self.shape1.core_support(-direction);
         let m = &self.rotation;
         let local = DVec3::new(m.x_axis.dot(direction), m.y_axis.dot(direction), m.z_axis.dot(direction));
-        let s = self.shape2.core_support(local);
-        let point2 = m.x_axis * s.x + m.y_axis * s.y + m.z_axis * s.z + self.position;
+        let point2 = self.place(self.shape2.core_support(local));
         Corner { difference: point2 - point1, point1 }
     }
 }
@@ -155,26 +233,61 @@ impl Simplex {
         (0..self.count).fold(DVec3::ZERO, |sum, k| sum + self.corners[k].point1 * self.weights[k])
     }
 
-    /// Keeps the corners of the face, edge or corner closest to the origin and sets their weights; false if it is
-    /// inside.
-    fn reduce(&mut self) -> bool {
+    /// The face, edge or corner closest to the origin; `None` if it is inside.
+    fn nearest_feature(&self) -> Option<Feature> {
         let p = self.corners.map(|c| c.difference);
-        let (indices, weights, count) = match self.count {
-            1 => ([0, 0, 0], [1.0, 0.0, 0.0], 1),
-            2 => closest_on_segment(&p, [0, 1]),
-            3 => closest_on_triangle(&p, [0, 1, 2]),
-            _ => match closest_on_tetrahedron(&p) {
-                Some(face) => face,
-                None => return false,
-            },
+        match self.count {
+            1 => Some(([0, 0, 0], [1.0, 0.0, 0.0], 1)),
+            2 => Some(closest_on_segment(&p, [0, 1])),
+            3 => Some(closest_on_triangle(&p, [0, 1, 2])),
+            _ => closest_on_tetrahedron(&p),
+        }
+    }
+
+    /// As [`Simplex::nearest_feature`] for an origin outside, by trying all of them: slower, but no rounding makes it farther
+    /// than any of them.
+    fn nearest_of_all(&self) -> Feature {
+        let p = self.corners.map(|c| c.difference);
+        let mut best = ([0, 0, 0], [1.0, 0.0, 0.0], 1);
+        let mut offer = |feature: Feature| {
+            if combine(&p, &feature).length_squared() < combine(&p, &best).length_squared() {
+                best = feature;
+            }
         };
+        for a in 0..self.count {
+            offer(([a, 0, 0], [1.0, 0.0, 0.0], 1));
+            for b in a + 1..self.count {
+                offer(closest_on_segment(&p, [a, b]));
+                for c in b + 1..self.count {
+                    offer(closest_on_triangle(&p, [a, b, c]));
+                }
+            }
+        }
+        best
+    }
+
+    /// Square of the distance of a feature's point.
+    fn squared(&self, feature: &Feature) -> f64 {
+        combine(&self.corners.map(|c| c.difference), feature).length_squared()
+    }
+
+    /// Keeps the corners of the feature closest to the origin; false if that is inside.
+    fn reduce(&mut self) -> bool {
+        let feature = self.nearest_feature();
+        if let Some(feature) = &feature {
+            self.keep(feature);
+        }
+        feature.is_some()
+    }
+
+    /// Drops the corners that are not part of a feature and takes over its weights.
+    fn keep(&mut self, &(indices, weights, count): &Feature) {
         let corners = self.corners;
         for k in 0..count {
             self.corners[k] = corners[indices[k]];
             self.weights[k] = weights[k];
         }
         self.count = count;
-        true
     }
 }
 

@@ -8,51 +8,45 @@
 //! where the corners miss it. So a can stands on four points of its rim, rolls on a line, and balances on a point.
 //!
 //! Nothing in this prefers one of the two shapes: with roles exchanged, the same points come out, mirrored.
+//!
+//! Features are placed in `f64` and looked at from the touching point, so that a pebble on a hall keeps its height.
 
 use super::clip::{ClipPoint, choose_four, clip_polygon};
-use super::distance::closest;
+use super::distance::{Gap, Nearness, Placed};
 use super::penetration::penetration;
 use super::support::Support;
 use super::{Manifold, ManifoldPoint};
-use crate::math::{Mat3, Pose, Real, Vec3, clamp, max, min, tangents};
+use crate::math::{Pose, Real, Vec3, clamp, max, min, tangents};
 use crate::shape::{FEATURE_POINTS, Feature, Shape};
+use glam::{DMat3, DVec3};
 
 /// Lines whose angle has a sine below this are parallel: two points.
 const PARALLEL_SINE: Real = 0.05;
 /// The corners miss the closest point if they are all farther by this share of the smaller size.
-const MISSED: Real = 1e-4;
+pub(super) const MISSED: Real = 1e-4;
 /// Corners of two features clipped by each other at most.
 const CLIPPED: usize = 2 * FEATURE_POINTS;
 /// The feature number of a closest point that no corner stands for.
-const WITNESS: u32 = 0x7FFF_FFFF;
+pub(super) const WITNESS: u32 = 0x7FFF_FFFF;
 
 /// Contacts of two convex shapes of any kind; nothing for others.
 pub(crate) fn collide((shape1, shape2): (&Shape, &Shape), pose: &Pose, margin: Real, manifold: &mut Manifold) {
     manifold.clear();
-    if let (Some(support1), Some(support2)) = (Support::new(shape1), Support::new(shape2)) {
-        collide_supports((&support1, &support2), pose, margin, manifold);
-    }
-}
-
-/// [`collide`] for support maps.
-pub(crate) fn collide_supports(
-    (support1, support2): (&Support<'_>, &Support<'_>),
-    pose: &Pose,
-    margin: Real,
-    manifold: &mut Manifold,
-) {
-    if let Some(touch) = Touch::find(support1, support2, pose, margin) {
-        let size = min(support1.inner_ball().1, support2.inner_ball().1);
-        let size = if size > 0.0 { size } else { max(support1.inner_ball().1, support2.inner_ball().1) };
-        touch.contacts((support1, support2), pose, (margin, size), manifold);
-    }
+    let (Some(support1), Some(support2)) = (Support::new(shape1), Support::new(shape2)) else { return };
+    let placed = Placed::new(&support1, &support2, pose);
+    let Some(touch) = Touch::find(&placed, margin) else { return };
+    let (size1, size2) = (support1.size(), support2.size());
+    let (mut feature1, mut feature2) = (Feature::default(), Feature::default());
+    support1.feature(touch.normal, &mut feature1);
+    support2.feature(-pose.rotation.inverse_rotate(touch.normal), &mut feature2);
+    touch.patch(&placed, (&feature1, &feature2), (margin, min(size1, size2)), manifold);
 }
 
 /// The nearest points of two shapes, or the deepest ones.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Touch {
     /// On the surface of shape 1, in its frame.
-    pub point1: Vec3,
+    pub point1: DVec3,
     /// Unit vector from shape 1 to shape 2.
     pub normal: Vec3,
     /// Gap, metres; negative where the shapes overlap.
@@ -61,43 +55,39 @@ pub(crate) struct Touch {
 
 impl Touch {
     /// `None` if the shapes are apart by more than `margin`.
-    pub fn find(support1: &Support<'_>, support2: &Support<'_>, pose: &Pose, margin: Real) -> Option<Self> {
-        let (radius1, radius2) = (support1.radius(), support2.radius());
-        if let Some(c) = closest(support1, support2, pose) {
-            let separation = c.distance - radius1 - radius2;
-            let point1 = c.point1 + c.normal * radius1;
-            return (separation <= margin).then_some(Self { point1, normal: c.normal, separation });
-        }
-        let p = penetration(support1, support2, pose)?;
-        let point1 = p.point1 + p.normal * radius1;
-        Some(Self { point1, normal: p.normal, separation: -p.depth - radius1 - radius2 })
+    pub(super) fn find(placed: &Placed<'_>, margin: Real) -> Option<Self> {
+        let [radius1, radius2] = placed.radii();
+        // A hair beyond what rounding may make of the separation.
+        let limit = (radius1 + radius2 + f64::from(margin)) * (1.0 + 1e-6);
+        let (point1, normal, distance) = match placed.nearness(limit) {
+            Nearness::Beyond => return None,
+            Nearness::Gap(Gap { point1, way }) => {
+                let distance = way.length();
+                (point1, way / distance, distance)
+            }
+            Nearness::Overlap => {
+                let found = penetration(placed);
+                (found.point1, found.normal, -found.depth)
+            }
+        };
+        let separation = (distance - radius1 - radius2) as Real;
+        let point1 = point1 + normal * radius1;
+        (separation <= margin).then_some(Self { point1, normal: normal.as_vec3(), separation })
     }
 
-    /// All points that carry the contact.
-    fn contacts(
+    /// The manifold of two features, each in the frame of its shape.
+    pub(super) fn patch(
         &self,
-        (support1, support2): (&Support<'_>, &Support<'_>),
-        pose: &Pose,
-        (margin, size): (Real, Real),
-        manifold: &mut Manifold,
-    ) {
-        let (mut feature1, mut feature2) = (Feature::default(), Feature::default());
-        support1.feature(self.normal, &mut feature1);
-        support2.feature(-pose.rotation.inverse_rotate(self.normal), &mut feature2);
-        feature2.points_mut().iter_mut().for_each(|point| *point = pose.transform_point(*point));
-        self.patch((&feature1, &feature2), (margin, size), manifold);
-    }
-
-    /// The manifold of two features in the frame of shape 1.
-    pub fn patch(
-        &self,
+        placed: &Placed<'_>,
         (feature1, feature2): (&Feature, &Feature),
         (margin, size): (Real, Real),
         manifold: &mut Manifold,
     ) {
         let (t1, t2) = tangents(self.normal);
-        let view = View { point: self.point1, to_plane: Mat3::from_cols(t1, t2, self.normal).transpose() };
-        let (figure1, figure2) = (Figure::new(feature1, &view), Figure::new(feature2, &view));
+        let to_plane = DMat3::from_cols(t1.as_dvec3(), t2.as_dvec3(), self.normal.as_dvec3()).transpose();
+        let view = View { point: self.point1, to_plane };
+        let figure1 = Figure::new(feature1, |point| view.see(point));
+        let figure2 = Figure::new(feature2, |point| view.see(placed.place(point)));
         let mut corners = [ClipPoint::default(); CLIPPED];
         let count = figure1.overlap(&figure2, &mut corners);
         let mut kept = 0;
@@ -106,26 +96,35 @@ impl Touch {
             let low = figure1.height(p.x, p.y);
             let separation = figure2.height(p.x, p.y) - low;
             if separation <= margin && separation.is_finite() {
+                // Nothing is deeper along the normal than the closest point, but planes through corners that are not quite
+                // level may say so.
+                let separation = max(separation, self.separation);
                 let position = Vec3::new(p.x, p.y, low);
                 corners[kept] = ClipPoint { position, separation, feature: corners[k].feature };
                 kept += 1;
             }
         }
-        let corners = &corners[..kept];
+        self.hand_on(&corners[..kept], (t1, t2), size, manifold);
+    }
+
+    /// The four corners that matter, with the closest point where all of them are farther.
+    fn hand_on(&self, corners: &[ClipPoint], (t1, t2): (Vec3, Vec3), size: Real, manifold: &mut Manifold) {
         let lowest = corners.iter().fold(Real::MAX, |m, c| min(c.separation, m));
-        let (chosen, mut chosen_count) = if kept <= 4 {
-            ([0, 1, 2, 3], kept)
+        let (chosen, mut count) = if corners.len() <= 4 {
+            ([0, 1, 2, 3], corners.len())
         } else {
-            choose_four(kept, |i| (corners[i].position.x, corners[i].position.y), |i| corners[i].separation, size)
+            let flat = |i: usize| (corners[i].position.x, corners[i].position.y);
+            choose_four(corners.len(), flat, |i| corners[i].separation, size)
         };
         if lowest > self.separation + MISSED * size {
-            chosen_count = chosen_count.min(3);
-            let (point1, normal, separation) = (self.point1, self.normal, self.separation);
+            count = count.min(3);
+            let (point1, normal, separation) = (self.point1.as_vec3(), self.normal, self.separation);
             manifold.push(ManifoldPoint { point1, normal, separation, feature: WITNESS });
         }
-        for &k in &chosen[..chosen_count] {
+        for &k in &chosen[..count] {
             let ClipPoint { position, separation, feature } = corners[k];
-            let point1 = view.point + t1 * position.x + t2 * position.y + self.normal * position.z;
+            let across = t1 * position.x + t2 * position.y + self.normal * position.z;
+            let point1 = (self.point1 + across.as_dvec3()).as_vec3();
             manifold.push(ManifoldPoint { point1, normal: self.normal, separation, feature });
         }
     }
@@ -133,9 +132,15 @@ impl Touch {
 
 /// Where a contact is looked at from: along its normal, about a point.
 struct View {
-    point: Vec3,
+    point: DVec3,
     /// Two tangents and the normal, as rows.
-    to_plane: Mat3,
+    to_plane: DMat3,
+}
+
+impl View {
+    fn see(&self, point: DVec3) -> Vec3 {
+        (self.to_plane * (point - self.point)).as_vec3()
+    }
 }
 
 /// A feature in the plane square to the normal, and how high it is over that plane.
@@ -149,11 +154,11 @@ struct Figure {
 
 impl Figure {
     /// The figure of a feature, winding counter-clockwise.
-    fn new(feature: &Feature, view: &View) -> Self {
+    fn new(feature: &Feature, see: impl Fn(DVec3) -> Vec3) -> Self {
         let mut corners = [Vec3::ZERO; FEATURE_POINTS];
         let count = feature.points().len();
         for (corner, point) in corners.iter_mut().zip(feature.points()) {
-            *corner = view.to_plane * (*point - view.point);
+            *corner = see(point.as_dvec3());
         }
         let mut figure = Self { corners, count, slope: [0.0; 2], base: corners[0].z };
         match count {
@@ -269,8 +274,8 @@ impl Figure {
     fn clip_face(&self, other: &Self, out: &mut [ClipPoint; CLIPPED]) -> usize {
         let mut buffer = [ClipPoint::default(); CLIPPED];
         let (mut front, mut back) = (out, &mut buffer);
-        for (k, (point, &position)) in front.iter_mut().zip(&other.corners[..other.count]).enumerate() {
-            *point = ClipPoint { position, separation: 0.0, feature: (k as u32 + 1) << 12 };
+        for (k, (corner, place)) in other.corners[..other.count].iter().zip(front.iter_mut()).enumerate() {
+            *place = ClipPoint { position: *corner, separation: 0.0, feature: (k as u32 + 1) << 12 };
         }
         let mut count = other.count;
         for k in 0..self.count {

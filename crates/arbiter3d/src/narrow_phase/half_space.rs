@@ -1,11 +1,12 @@
 //! Half-spaces (all below the plane through the origin, normal y) against convex shapes: exact, as every height is.
 
 use super::clip::choose_four;
+use super::general::MISSED;
 use super::mesh_points::{Candidate, Candidates, NO_FACET, position_number};
 use super::support::Support;
 use super::{Manifold, ManifoldPoint};
-use crate::math::{Pose, Real, Vec3, max};
-use crate::shape::{Feature, Shape, Surface};
+use crate::math::{Pose, Real, Vec3, max, min};
+use crate::shape::{FEATURE_POINTS, Feature, Shape, Surface};
 
 /// Contacts of a half-space (shape 1) with a convex shape or a surface; nothing for others.
 pub(crate) fn collide(shape: &Shape, pose: &Pose, margin: Real, manifold: &mut Manifold) {
@@ -21,29 +22,30 @@ pub(crate) fn collide(shape: &Shape, pose: &Pose, margin: Real, manifold: &mut M
     }
     let mut feature = Feature::default();
     support.feature(down, &mut feature);
-    let mut points = [Vec3::ZERO; crate::shape::FEATURE_POINTS];
+    let mut points = [(Vec3::ZERO, 0); FEATURE_POINTS];
     let (mut count, mut least) = (0, Real::MAX);
-    for &corner in feature.points() {
+    for (number, &corner) in feature.points().iter().enumerate() {
         let point = pose.transform_point(corner);
-        least = crate::math::min(point.y, least);
+        least = min(point.y, least);
         if point.y <= margin {
-            points[count] = point;
+            points[count] = (point, number as u32 + 1);
             count += 1;
         }
     }
-    let size = max(support.inner_ball().1, 1e-3 * support.reach(Vec3::ZERO));
-    let (chosen, chosen_count) = if count <= 4 {
+    let size = support.size();
+    let (chosen, mut chosen_count) = if count <= 4 {
         ([0, 1, 2, 3], count)
     } else {
-        choose_four(count, |i| (points[i].x, points[i].z), |i| points[i].y, size)
+        choose_four(count, |i| (points[i].0.x, points[i].0.z), |i| points[i].0.y, size)
     };
-    for &k in &chosen[..chosen_count] {
-        push(points[k], k as u32 + 1, manifold);
-    }
     // A thinned or sampled feature can lack the lowest point.
-    if least > lowest + 1e-4 * size && manifold.points().len() < 4 {
-        let deepest = support.full_support(down.as_dvec3()).as_vec3();
-        push(pose.transform_point(deepest), 0, manifold);
+    if least > lowest + MISSED * size {
+        chosen_count = chosen_count.min(3);
+        let deepest = pose.transform_point(support.full_support(down.as_dvec3()).as_vec3());
+        push(Vec3::new(deepest.x, lowest, deepest.z), 0, manifold);
+    }
+    for &k in &chosen[..chosen_count] {
+        push(points[k].0, points[k].1, manifold);
     }
 }
 

@@ -12,7 +12,9 @@
 
 use super::mesh_points::{Candidate, Candidates, NO_FACET};
 use super::polyhedron::{CuboidFeatures, Polyhedron};
+use super::support::Support;
 use super::triangle::{Frame, Group, Reach, Solid};
+use super::triangle_general::General;
 use super::triangle_lanes::Near;
 use super::triangle_solid::Faceted;
 use super::{Manifold, ManifoldPoint};
@@ -37,7 +39,11 @@ pub(crate) fn collide(mesh: Surface<'_>, convex: &Shape, pose: &Pose, margin: Re
             contact.gather(&mut Faceted::new(CuboidFeatures::new(cuboid).view()), pose.rotation.to_mat3());
         }
         Shape::Hull(hull) => contact.gather(&mut Faceted::new(Polyhedron::from_hull(hull)), pose.rotation.to_mat3()),
-        _ => {}
+        _ => {
+            if let Some(support) = Support::new(convex) {
+                contact.gather(&mut General::new(support), pose.rotation.to_mat3());
+            }
+        }
     }
 }
 

@@ -26,12 +26,14 @@ mod mesh;
 mod mesh_points;
 mod penetration;
 mod polyhedron;
+mod revolved;
 mod seam;
 mod sphere;
 mod support;
 mod surfaces;
 mod time_of_impact;
 mod triangle;
+mod triangle_general;
 mod triangle_lanes;
 mod triangle_solid;
 
@@ -143,6 +145,7 @@ fn collide_sorted(
         (Shape::Voxels(a), other) => composite::collide(level, (&**a, other), pose, margin, manifold),
         (Shape::HalfSpace(_), other) => half_space::collide(other, pose, margin, manifold),
         (Shape::Mesh(_) | Shape::HeightField(_), other) => collide_surface(shape1, other, pose, margin, manifold),
+        (revolved, Shape::Sphere(b)) if revolved::revolved_sphere(revolved, b, pose, margin, manifold) => {}
         _ => general::collide((shape1, shape2), pose, margin, manifold),
     }
 }
@@ -167,4 +170,8 @@ fn mirror(pose: &Pose, manifold: &mut Manifold) {
 }
 
 #[cfg(test)]
+mod oracle_tests;
+#[cfg(test)]
 mod tests;
+#[cfg(test)]
+pub(crate) use tests::Random;

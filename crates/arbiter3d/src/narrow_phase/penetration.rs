@@ -6,36 +6,45 @@
 //! den Bergen, "Proximity Queries and Penetration Depth Computation on 3D Game Objects", 2001.
 //!
 //! Unlike there, the first tetrahedron need not hold the origin: a face that the origin is in front of has a negative
-//! distance and so comes first; if it cannot be moved past the origin, the cores are apart. The depth told is that along the
-//! normal found, which is never less than the least one, and more by no more than [`GAIN`].
+//! distance and so comes first. The depth told is that along the normal found, which is never less than the least one, and
+//! more by no more than [`GAIN`]. Round sets would need many corners for that: they are searched less finely, and the way out
+//! is then polished with closest points.
 //!
 //! All in `f64`, as in `distance`.
 
-use super::distance::Placed;
-use super::support::Support;
-use crate::math::{Pose, Real, Vec3};
+use super::distance::{Gap, Nearness, Placed};
 use glam::DVec3;
 
 /// A face is on the boundary if the set reaches past it by less than this share of the size.
 const GAIN: f64 = 1e-7;
+/// Of round sets: by less than this share of the smaller shape's size, because the rest is polished.
+const ROUND_GAIN: f64 = 1e-5;
+/// And this share of the depth.
+const ROUND_SHARE: f64 = 5e-6;
+/// But no less than this share of the set's size.
+const ROUNDING: f64 = 1e-9;
 /// What is thinner than this share of its size is flat.
 const FLAT: f64 = 1e-9;
 /// A triangle is a sliver if twice its area is less than this share of the square of its longest edge.
 const SLIVER: f64 = 1e-10;
-/// A polyhedron of `n` corners has `2n − 4` faces, and a corner adds two; all are kept, the dead ones too.
+/// A polyhedron of `n` corners has `2n − 4` faces.
 const MAX_CORNERS: usize = 96;
-const MAX_FACES: usize = 512;
+const MAX_FACES: usize = 2 * MAX_CORNERS - 4;
 const MAX_HORIZON: usize = 64;
+/// How far beyond touching the shapes are moved apart to see the way out better, as a share of the smaller size.
+const LIFT: f64 = 1e-2;
+/// Times that is done.
+const POLISHINGS: usize = 3;
 
 /// Where two overlapping cores are to be parted, in the frame of shape 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Penetration {
     /// Deepest point of the core of shape 1 in that of shape 2.
-    pub point1: Vec3,
+    pub point1: DVec3,
     /// Unit vector from shape 1 to shape 2: moved along it by `depth`, shape 2 only touches.
-    pub normal: Vec3,
-    /// Zero or more, metres.
-    pub depth: Real,
+    pub normal: DVec3,
+    /// Metres; below zero by rounding.
+    pub depth: f64,
 }
 
 #[derive(Clone, Copy)]
@@ -51,7 +60,6 @@ struct Face {
     normal: DVec3,
     /// `normal · x` on the face; the largest number there is for a sliver.
     offset: f64,
-    alive: bool,
 }
 
 /// A growing polytope.
@@ -62,9 +70,14 @@ struct Polytope {
     face_count: usize,
 }
 
-/// Overlap of two cores, `pose` placing shape 2 in the frame of shape 1; `None` where they are apart.
-pub(crate) fn penetration(shape1: &Support<'_>, shape2: &Support<'_>, pose: &Pose) -> Option<Penetration> {
-    let placed = Placed::new(shape1, shape2, pose);
+/// Overlap of two cores that are not apart.
+pub(super) fn penetration(placed: &Placed<'_>) -> Penetration {
+    let found = least_way_out(placed).unwrap_or_else(|| along(placed, placed.position().normalize_or(DVec3::Y)));
+    if placed.is_round() { polished(placed, found) } else { found }
+}
+
+/// The expanding polytope; `None` if all of it is slivers.
+fn least_way_out(placed: &Placed<'_>) -> Option<Penetration> {
     // `Placed` gives differences `x2 − x1`.
     let corner = |direction: DVec3| {
         let corner = placed.corner(-direction);
@@ -72,23 +85,57 @@ pub(crate) fn penetration(shape1: &Support<'_>, shape2: &Support<'_>, pose: &Pos
     };
     let first = match first_corners(&corner) {
         Ok(first) => first,
-        Err((normal, on_plane)) => return flat_penetration(normal, on_plane),
+        Err((normal, on_plane)) => return Some(flat_penetration(normal, on_plane)),
     };
     let mut polytope = Polytope::new(first);
     let size = first.iter().fold(0.0, |size: f64, c| larger(c.difference.length_squared(), size)).sqrt();
+    let round_gain = if placed.is_round() { ROUND_GAIN * placed.size() } else { 0.0 };
+    // The least depth seen, for a search that has to be given up.
+    let mut best = along(placed, placed.position().normalize_or(DVec3::Y));
     loop {
         let nearest = polytope.nearest_face()?;
         let face = polytope.faces[nearest];
         let reached = corner(face.normal);
         let height = reached.difference.dot(face.normal);
-        let done = height - face.offset <= GAIN * size;
-        if done && face.offset < -GAIN * size {
-            return None;
-        }
-        if done || !polytope.expand(nearest, reached) {
+        let gain = if round_gain > 0.0 {
+            larger(round_gain + ROUND_SHARE * height.abs(), ROUNDING * size)
+        } else {
+            GAIN * size
+        };
+        if height - face.offset <= gain {
             return Some(polytope.result(&face, height));
         }
+        if height < best.depth {
+            best = Penetration { point1: reached.point1, normal: face.normal, depth: height };
+        }
+        if !polytope.expand(nearest, reached) {
+            return Some(best);
+        }
     }
+}
+
+/// How far the cores overlap along a unit direction.
+fn along(placed: &Placed<'_>, normal: DVec3) -> Penetration {
+    let corner = placed.corner(-normal);
+    Penetration { point1: corner.point1, normal, depth: -corner.difference.dot(normal) }
+}
+
+/// The same way out, seen from a little farther: with the shapes moved just apart along the normal found, the closest points
+/// tell the true one the better the shallower the overlap is, because the normal of a round surface turns by less than the
+/// position that it is looked at from.
+fn polished(placed: &Placed<'_>, found: Penetration) -> Penetration {
+    let (mut best, lift) = (found, LIFT * placed.size());
+    for _ in 0..POLISHINGS {
+        let moved = placed.moved(best.normal * (best.depth + lift));
+        let Nearness::Gap(Gap { point1, way }) = moved.nearness(f64::INFINITY) else { break };
+        let normal = way / way.length();
+        let next = Penetration { point1, ..along(placed, normal) };
+        if next.depth >= best.depth {
+            break;
+        }
+        best = next;
+    }
+    best
 }
 
 fn larger(a: f64, b: f64) -> f64 {
@@ -136,20 +183,17 @@ fn first_corners(corner: &impl Fn(DVec3) -> Corner) -> Result<[Corner; 4], (DVec
     Ok([a, b, c, d])
 }
 
-/// Two flat cores in one plane overlap by nothing across it, if the plane is the origin's.
-fn flat_penetration(normal: DVec3, on_plane: Corner) -> Option<Penetration> {
+/// Two flat cores in one plane overlap by nothing across it; the plane is the origin's but for rounding.
+fn flat_penetration(normal: DVec3, on_plane: Corner) -> Penetration {
     let height = on_plane.difference.dot(normal);
-    (height.abs() <= 1e-6 * (1.0 + on_plane.difference.length())).then(|| Penetration {
-        point1: on_plane.point1.as_vec3(),
-        normal: normal.as_vec3(),
-        depth: 0.0,
-    })
+    let normal = if height > 0.0 { -normal } else { normal };
+    Penetration { point1: on_plane.point1, normal, depth: -height.abs() }
 }
 
 impl Polytope {
     fn new(first: [Corner; 4]) -> Self {
         let none = Corner { difference: DVec3::ZERO, point1: DVec3::ZERO };
-        let dead = Face { corners: [0; 3], normal: DVec3::ZERO, offset: 0.0, alive: false };
+        let dead = Face { corners: [0; 3], normal: DVec3::ZERO, offset: 0.0 };
         let mut polytope =
             Self { corners: [none; MAX_CORNERS], corner_count: 4, faces: [dead; MAX_FACES], face_count: 0 };
         polytope.corners[..4].copy_from_slice(&first);
@@ -173,15 +217,15 @@ impl Polytope {
         let good = length > SLIVER * longest;
         let normal = if good { cross / length } else { DVec3::ZERO };
         let offset = if good { normal.dot(a) } else { f64::MAX };
-        self.faces[self.face_count] = Face { corners, normal, offset, alive: true };
+        self.faces[self.face_count] = Face { corners, normal, offset };
         self.face_count += 1;
     }
 
-    /// The live face with the least offset, the first of several.
+    /// The face with the least offset, the first of several.
     fn nearest_face(&self) -> Option<usize> {
         let (mut best, mut least) = (None, f64::MAX);
         for (index, face) in self.faces[..self.face_count].iter().enumerate() {
-            if face.alive && face.offset < least {
+            if face.offset < least {
                 (best, least) = (Some(index), face.offset);
             }
         }
@@ -194,30 +238,45 @@ impl Polytope {
     /// too, here and there.
     fn expand(&mut self, seen: usize, corner: Corner) -> bool {
         let mut outline = Outline { edges: [[0; 2]; MAX_HORIZON], count: 0 };
-        let mut patch = [seen as u16; MAX_HORIZON];
-        let (mut patch_count, mut grows) = (1, true);
         if self.corner_count == MAX_CORNERS || !outline.cross(self.faces[seen].corners) {
             return false;
         }
+        // Those that see the corner, the patch first.
+        let mut patch = [seen as u16; MAX_FACES];
+        let mut seeing = 1;
+        for (index, face) in self.faces[..self.face_count].iter().enumerate() {
+            let sliver = face.offset == f64::MAX;
+            if index != seen && (sliver || face.normal.dot(corner.difference) > face.offset) {
+                patch[seeing] = index as u16;
+                seeing += 1;
+            }
+        }
+        let (mut patch_count, mut grows) = (1, true);
         while grows {
             grows = false;
-            for (index, face) in self.faces[..self.face_count].iter().enumerate() {
-                let sliver = face.offset == f64::MAX;
-                let sees = face.alive && (sliver || face.normal.dot(corner.difference) > face.offset);
-                if sees && outline.touches(face.corners) && !patch[..patch_count].contains(&(index as u16)) {
-                    if patch_count == MAX_HORIZON || !outline.cross(face.corners) {
+            let mut k = patch_count;
+            while k < seeing {
+                let corners = self.faces[patch[k] as usize].corners;
+                if outline.touches(corners) {
+                    if !outline.cross(corners) {
                         return false;
                     }
-                    patch[patch_count] = index as u16;
+                    patch.swap(patch_count, k);
                     patch_count += 1;
                     grows = true;
                 }
+                k += 1;
             }
         }
-        if self.face_count + outline.count > MAX_FACES {
+        if self.face_count - patch_count + outline.count > MAX_FACES {
             return false;
         }
-        patch[..patch_count].iter().for_each(|&index| self.faces[index as usize].alive = false);
+        // The last face takes the place of each that goes, from the back so that none of those moves.
+        patch[..patch_count].sort_unstable();
+        for &index in patch[..patch_count].iter().rev() {
+            self.face_count -= 1;
+            self.faces[index as usize] = self.faces[self.face_count];
+        }
         let index = self.corner_count as u16;
         self.corners[self.corner_count] = corner;
         self.corner_count += 1;
@@ -238,7 +297,7 @@ impl Polytope {
         } else {
             a.point1
         };
-        Penetration { point1: point1.as_vec3(), normal: face.normal.as_vec3(), depth: larger(height, 0.0) as Real }
+        Penetration { point1, normal: face.normal, depth: height }
     }
 }
 
@@ -278,13 +337,15 @@ impl Outline {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::Rotation;
+    use crate::math::{Pose, Rotation, Vec3};
+    use crate::narrow_phase::support::Support;
     use crate::narrow_phase::tests::Random;
     use crate::shape::{Cuboid, Cylinder, Shape};
 
     fn depth(a: &Support<'_>, b: &Support<'_>, pose: &Pose) -> Option<Penetration> {
-        let found = penetration(a, b, pose);
-        let swapped = penetration(b, a, &pose.inverse());
+        let pairs = [Placed::new(a, b, pose), Placed::new(b, a, &pose.inverse())];
+        let [found, swapped] =
+            pairs.map(|pair| matches!(pair.nearness(f64::INFINITY), Nearness::Overlap).then(|| penetration(&pair)));
         assert_eq!(found.is_some(), swapped.is_some());
         if let (Some(x), Some(y)) = (found, swapped) {
             assert!((x.depth - y.depth).abs() < 1e-5, "{x:?} {y:?}");
@@ -296,18 +357,18 @@ mod tests {
     fn known_depths() {
         let cube = Support::Cuboid(Cuboid::new(Vec3::ONE).unwrap());
         let found = depth(&cube, &cube, &Pose::from_position(Vec3::new(0.1, 1.7, -0.2))).unwrap();
-        assert!((found.depth - 0.3).abs() < 1e-6 && (found.normal - Vec3::Y).length() < 1e-6, "{found:?}");
+        assert!((found.depth - 0.3).abs() < 1e-6 && (found.normal - DVec3::Y).length() < 1e-6, "{found:?}");
         assert!(depth(&cube, &cube, &Pose::from_position(Vec3::new(0.0, 2.1, 0.0))).is_none());
         let can = Support::Cylinder(Cylinder::new(1.0, 0.5).unwrap());
         let lying = Pose::new(Vec3::new(0.0, 1.45, 0.0), Rotation::from_xyzw(1.0, 0.0, 0.0, 1.0).normalize());
         let found = depth(&cube, &can, &lying).unwrap();
-        assert!((found.depth - 0.05).abs() < 1e-6 && (found.normal - Vec3::Y).length() < 1e-5, "{found:?}");
+        assert!((found.depth - 0.05).abs() < 1e-6 && (found.normal - DVec3::Y).length() < 1e-5, "{found:?}");
         // Two balls as ellipsoids: the line of centres.
         let ball = Shape::ellipsoid(Vec3::ONE).unwrap();
         let ball = Support::new(&ball).unwrap();
         let found = depth(&ball, &ball, &Pose::from_position(Vec3::new(0.9, 1.2, 0.0))).unwrap();
         assert!((found.depth - 0.5).abs() < 1e-5, "{found:?}");
-        assert!((found.normal - Vec3::new(0.6, 0.8, 0.0)).length() < 2e-3, "{found:?}");
+        assert!((found.normal - DVec3::new(0.6, 0.8, 0.0)).length() < 2e-3, "{found:?}");
     }
 
     /// Moved out along the normal by the depth, shapes touch; moved by a little less in any direction, they overlap.
@@ -327,10 +388,11 @@ mod tests {
             let Some(found) = depth(&a, &b, &pose) else { continue };
             overlaps += 1;
             let moved = |d: Vec3| Pose::new(pose.position + d, pose.rotation);
-            let out = super::super::distance::closest(&a, &b, &moved(found.normal * (found.depth + 1e-4)));
+            let way = (found.normal * (found.depth + 1e-4)).as_vec3();
+            let out = super::super::distance::closest(&a, &b, &moved(way));
             assert!(out.is_some_and(|c| c.distance < 2e-4), "{round}: {found:?} {out:?}");
             for _ in 0..20 {
-                let d = random.direction() * (0.995 * found.depth - 1e-5);
+                let d = random.direction() * (0.995 * found.depth as f32 - 1e-5);
                 assert!(super::super::distance::closest(&a, &b, &moved(d)).is_none_or(|c| c.distance < 1e-5));
             }
         }

@@ -9,6 +9,9 @@ use glam::DVec3;
 
 use super::polyhedron::{CuboidFeatures, Polyhedron};
 
+/// Of what has no inner radius: the share of its reach that counts as its size.
+const FLAT_SIZE: Real = 0.1;
+
 /// A convex shape as a core with a radius.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Support<'a> {
@@ -65,6 +68,20 @@ impl<'a> Support<'a> {
             Self::Rounded(s) => s.radius() + Self::new(s.core()).map_or(0.0, |core| core.radius()),
             Self::Scaled { shape, factor, .. } => Self::new(shape).map_or(0.0, |whole| whole.radius() * factor),
             _ => 0.0,
+        }
+    }
+
+    /// Whether the core is more than a few corners.
+    pub(crate) fn has_round_core(&self) -> bool {
+        match self {
+            Self::Sphere(_)
+            | Self::Capsule(_)
+            | Self::Cuboid(_)
+            | Self::Hull(_)
+            | Self::Triangle(_)
+            | Self::Cloud(_) => false,
+            Self::Rounded(s) => Self::new(s.core()).is_some_and(|core| core.has_round_core()),
+            _ => true,
         }
     }
 
@@ -206,6 +223,12 @@ impl<'a> Support<'a> {
             Self::Scaled { shape, center, factor } => (*center, shape.inner_ball().1 * factor),
             other => other.geometry().map_or((Vec3::ZERO, 0.0), |shape| shape.inner_ball()),
         }
+    }
+
+    /// A length that tolerances are relative to: the inner radius, or for flat shapes a share of how far they reach.
+    pub(crate) fn size(&self) -> Real {
+        let (center, radius) = self.inner_ball();
+        if radius > 0.0 { radius } else { FLAT_SIZE * self.reach(center) }
     }
 
     /// The face, line or point of the whole shape that lies most along a unit direction.

@@ -7,7 +7,7 @@ use crate::shape::ConvexHull;
 use glam::{DMat3, DVec3};
 
 /// Numbers that repeat from run to run (Marsaglia's xorshift, 2003).
-pub(in crate::narrow_phase) struct Random(pub u64);
+pub(crate) struct Random(pub u64);
 
 impl Random {
     pub fn unit(&mut self) -> Real {

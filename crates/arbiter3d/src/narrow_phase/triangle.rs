@@ -262,7 +262,7 @@ impl Group {
 
     /// Visits the triangles one by one, and is empty then. Returns whether any visit returned true.
     #[inline(always)]
-    fn drain(&mut self, mesh: Surface<'_>, frame: &Frame, mut visit: impl FnMut(&Triangle) -> bool) -> bool {
+    pub(super) fn drain(&mut self, mesh: Surface<'_>, frame: &Frame, mut visit: impl FnMut(&Triangle) -> bool) -> bool {
         let mut any = false;
         for k in 0..std::mem::take(&mut self.count) {
             any |= visit(&Triangle::new(mesh, frame, self.indices[k], self.sides[k]));

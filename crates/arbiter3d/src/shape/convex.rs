@@ -46,12 +46,11 @@ impl Feature {
         &mut self.points[..self.count]
     }
 
-    /// The disc about the y axis at height `y`, which looks along `d`: one corner is the point of the rim that is furthest
-    /// along `d`.
+    /// The disc about the y axis at height `y`, which looks along `d`. Where it clearly leans, one corner is the point of the
+    /// rim that is furthest along `d`; nearly level its corners stay where they are on the body, so that rest is rest.
     pub fn set_disc(&mut self, y: Real, radius: Real, d: Vec3) {
         let across = (d.x * d.x + d.z * d.z).sqrt();
-        // Standing upright the corners stay where they are on the body.
-        let (cosine, sine) = if across > 1e-4 { (d.x / across, d.z / across) } else { (1.0, 0.0) };
+        let (cosine, sine) = if across > LEANING { (d.x / across, d.z / across) } else { (1.0, 0.0) };
         let turn = if d.y > 0.0 { -1.0 } else { 1.0 };
         for (c, s) in SIXTEENTHS {
             let (x, z) = (c * cosine - s * turn * sine, c * sine + s * turn * cosine);
@@ -67,6 +66,9 @@ impl Feature {
         }
     }
 }
+
+/// A disc leans whose axis is off the direction by more than this sine.
+const LEANING: Real = 0.02;
 
 /// Cosines and sines of the sixteenths of a turn.
 const SIXTEENTHS: [(Real, Real); FEATURE_POINTS] = {
@@ -158,26 +160,30 @@ pub(crate) fn mass_of_support(support: &Support<'_>) -> Result<MassProperties, S
 }
 
 /// The feature of a shape known by its support alone: the support points of directions around the one asked for, where they
-/// are far enough apart to be a face or an edge.
+/// stay as far apart as the directions come closer. Those of a round spot come closer too.
 pub(crate) fn sampled_feature(support: &dyn Fn(Vec3) -> Vec3, d: Vec3, size: Real, out: &mut Feature) {
-    /// How far the directions lean.
-    const LEAN: Real = 0.03;
+    /// How far the directions lean, and how far the closer ones.
+    const LEANS: [Real; 2] = [0.06, 0.02];
+    /// The share of their spread that the closer ones of a face or an edge still have.
+    const LASTING: Real = 0.6;
     let (t1, t2) = tangents(d);
     let top = support(d);
-    let mut ring = [top; FEATURE_POINTS / 2];
-    for (k, point) in ring.iter_mut().enumerate() {
-        let (cosine, sine) = SIXTEENTHS[2 * k];
-        *point = support((d + (t1 * cosine + t2 * sine) * LEAN).normalize());
-    }
-    // Points of a face or an edge are far apart; those of a round spot lie close together.
-    let far = 0.15 * size;
-    let spread = ring.iter().fold(0.0, |most, p| crate::math::max((*p - ring[0]).length_squared(), most));
-    if spread < far * far {
+    let rings = LEANS.map(|lean| {
+        let mut ring = [top; FEATURE_POINTS / 2];
+        for (k, point) in ring.iter_mut().enumerate() {
+            let (cosine, sine) = SIXTEENTHS[2 * k];
+            *point = support((d + (t1 * cosine + t2 * sine) * lean).normalize());
+        }
+        ring
+    });
+    let spread = rings
+        .map(|ring| ring.iter().fold(0.0, |most, p| crate::math::max((*p - ring[0]).length_squared(), most)).sqrt());
+    let near = 0.02 * size;
+    if spread[0] < near || spread[1] < LASTING * spread[0] {
         out.push(top);
         return;
     }
-    let near = 0.01 * size;
-    for point in ring {
+    for point in rings[0] {
         let new = out.points().iter().all(|other| (*other - point).length_squared() > near * near);
         if new {
             out.push(point);

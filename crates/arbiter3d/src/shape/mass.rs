@@ -180,4 +180,116 @@ mod tests {
         assert!((sum.mass - whole.mass).abs() < 1e-5 && sum.center.length() < 1e-6);
         assert!((sum.inertia.yy - whole.inertia.yy).abs() < 1e-5);
     }
+
+    /// The upper half of a ball.
+    #[derive(Debug)]
+    struct HalfBall;
+
+    impl crate::ConvexShape for HalfBall {
+        fn support(&self, direction: Vec3) -> Vec3 {
+            let across = Vec3::new(direction.x, 0.0, direction.z);
+            if direction.y > 0.0 { direction.normalize_or_zero() } else { across.normalize_or_zero() }
+        }
+
+        fn center(&self) -> Vec3 {
+            Vec3::new(0.0, 0.375, 0.0)
+        }
+    }
+
+    /// By columns: rays from above and from below tell where each begins and ends.
+    fn by_columns(shape: &Shape) -> Moments {
+        const CELLS: usize = 160;
+        let bounds = shape.local_aabb();
+        let (low, size) = (bounds.min.as_dvec3(), (bounds.max - bounds.min).as_dvec3());
+        let mut sum = Moments::default();
+        let area = size.x * size.z / (CELLS * CELLS) as f64;
+        for i in 0..CELLS * CELLS {
+            let cell = |k: usize| (k as f64 + 0.5) / CELLS as f64;
+            let (x, z) = (low.x + size.x * cell(i % CELLS), low.z + size.z * cell(i / CELLS));
+            let far = 1.5 * size.y as Real;
+            let cast = |from: Real, way: Real| {
+                let origin = Vec3::new(x as Real, from, z as Real);
+                let ray = crate::query::Ray { origin, direction: Vec3::Y * way, max_fraction: 1.0 };
+                shape.geometry().cast_ray(&ray).map(|hit| f64::from(from + way * hit.fraction))
+            };
+            let (Some(top), Some(bottom)) =
+                (cast(bounds.max.y + 0.2 * far, -2.0 * far), cast(bounds.min.y - 0.2 * far, 2.0 * far))
+            else {
+                continue;
+            };
+            let height = (top - bottom) * area;
+            let (y, y2) = (0.5 * (top + bottom), (top * top + top * bottom + bottom * bottom) / 3.0);
+            let middle = DVec3::new(x, y, z);
+            sum.volume += height;
+            sum.first += middle * height;
+            let mut squares = outer(middle, middle);
+            squares.y_axis.y = y2;
+            sum.second += squares * height;
+        }
+        sum
+    }
+
+    /// Mass, centre and inertia of every kind against sums over columns.
+    #[test]
+    fn masses_are_what_quadrature_finds() {
+        let sheared = crate::math::Mat3::from_cols(Vec3::X, Vec3::new(0.4, 0.9, -0.2), Vec3::Z * 0.7);
+        let points: Vec<Vec3> = (0..20)
+            .map(|i| Vec3::new((i * 7 % 11) as Real / 11.0, (i * 5 % 13) as Real / 13.0, (i * 3 % 17) as Real / 17.0))
+            .collect();
+        let shapes = [
+            Shape::cylinder(0.6, 0.3),
+            Shape::cone(0.6, 0.5),
+            Shape::tapered_capsule(0.4, 0.2, 0.5),
+            Shape::ellipsoid(Vec3::new(0.3, 0.5, 0.7)),
+            Shape::cylinder(0.6, 0.3).unwrap().transformed(sheared, Vec3::new(0.3, -0.2, 0.1)),
+            Shape::rounded(&Shape::cuboid(Vec3::new(0.3, 0.4, 0.5)).unwrap(), 0.2),
+            Shape::rounded(&Shape::hull(&points).unwrap(), 0.1),
+            Shape::rounded(&Shape::cylinder(0.4, 0.3).unwrap(), 0.1),
+            Shape::point_cloud(&points),
+            Shape::custom(HalfBall),
+            Shape::capsule(0.4, 0.3),
+            Shape::sphere(0.7),
+            Shape::hull(&points),
+        ];
+        for shape in shapes.map(|shape| shape.unwrap()) {
+            let (found, expected) = (shape.mass_properties(1.0).unwrap(), by_columns(&shape).unit_mass().unwrap());
+            let size = shape.reach();
+            assert!((found.mass / expected.mass - 1.0).abs() < 1e-3, "{shape:?}: {found:?} {expected:?}");
+            assert!((found.center - expected.center).length() < 1e-3 * size, "{shape:?}: {found:?} {expected:?}");
+            let (a, b) = (found.inertia, expected.inertia);
+            let allowed = 2e-3 * (b.xx + b.yy + b.zz);
+            for (x, y) in [(a.xx, b.xx), (a.yy, b.yy), (a.zz, b.zz), (a.xy, b.xy), (a.xz, b.xz), (a.yz, b.yz)] {
+                assert!((x - y).abs() < allowed, "{shape:?}: {a:?} {b:?}");
+            }
+        }
+    }
+
+    /// A tapered capsule, cut into thin discs.
+    #[test]
+    fn a_tapered_capsule_has_the_mass_of_its_slices() {
+        let (h, a, b) = (0.4, 0.2, 0.5);
+        let found = Shape::tapered_capsule(h as Real, a as Real, b as Real).unwrap().mass_properties(1.0).unwrap();
+        let slope = (b - a) / (2.0 * h);
+        let side = (1.0_f64 - slope * slope).sqrt();
+        let (low, high) = (slope * b - h, slope * a + h);
+        let (mut volume, mut first, mut axial) = (0.0, 0.0, 0.0);
+        let slices = 400_000;
+        let (from, to) = (-h - b, h + a);
+        for k in 0..slices {
+            let y = from + (to - from) * (k as f64 + 0.5) / slices as f64;
+            let squared = if y < low {
+                b * b - (y + h) * (y + h)
+            } else if y > high {
+                a * a - (y - h) * (y - h)
+            } else {
+                let radius = (slope * h + a - slope * y) / side;
+                radius * radius
+            };
+            let area = std::f64::consts::PI * squared * (to - from) / slices as f64;
+            (volume, first, axial) = (volume + area, first + area * y, axial + 0.5 * area * squared);
+        }
+        assert!((f64::from(found.mass) / volume - 1.0).abs() < 1e-5);
+        assert!((f64::from(found.center.y) - first / volume).abs() < 1e-5);
+        assert!((f64::from(found.inertia.yy) / axial - 1.0).abs() < 1e-5);
+    }
 }

@@ -45,6 +45,8 @@ pub use capsule::Capsule;
 pub use compound::{Compound, CompoundChild};
 pub use cone::Cone;
 use convex::DrawnSurface;
+#[cfg(test)]
+pub(crate) use convex::sphere_grid;
 pub(crate) use convex::{FEATURE_POINTS, FLAT_SINE, Feature};
 pub use cuboid::Cuboid;
 pub use custom::{ConvexShape, Custom};

@@ -2,7 +2,7 @@
 
 use super::convex::{FLAT_SINE, Feature};
 use super::geometry::Geometry;
-use super::mass::mass_of_revolution;
+use super::mass::{RevolvedPiece, mass_of_revolution};
 use super::{MassProperties, ShapeError, positive};
 use crate::math::{Aabb, Pose, Real, Vec3, max};
 use crate::narrow_phase::Support;
@@ -111,7 +111,7 @@ impl Geometry for TaperedCapsule {
             let radius = cosine * (b + (a - b) * (y - low) / (high - low));
             radius * radius
         };
-        let pieces: [super::mass::RevolvedPiece<'_>; 3] =
+        let pieces: [RevolvedPiece<'_>; 3] =
             [(-h - b, low, &ball(-h, b)), (low, high, &frustum), (high, h + a, &ball(h, a))];
         Ok(mass_of_revolution(&pieces).scaled(density))
     }

@@ -7,7 +7,7 @@ use super::convex::Feature;
 use super::geometry::Geometry;
 use super::mass::Moments;
 use super::{MassProperties, Shape, ShapeError};
-use crate::math::{Aabb, Mat3, Pose, Real, Vec3, max, max3, min, min3};
+use crate::math::{Aabb, Mat3, Pose, Real, Vec3, max, max3, min3};
 use crate::narrow_phase::Support;
 use crate::query::{Ray, ShapeHit, cast_ray};
 use glam::{DMat3, DVec3};
@@ -139,8 +139,10 @@ impl Geometry for Transformed {
         (self.linear * self.shape.inner_ball().0 + self.translation, self.inner_radius)
     }
 
+    /// What rolled before, shrunk as the inner ball.
     fn rounding_radius(&self) -> Real {
-        if self.shape.rounding_radius() > 0.0 { min(self.inner_radius, self.shape.rounding_radius()) } else { 0.0 }
+        let inner = self.shape.inner_ball().1;
+        if inner > 0.0 { self.shape.rounding_radius() * (self.inner_radius / inner) } else { 0.0 }
     }
 
     fn cast_ray(&self, ray: &Ray) -> Option<ShapeHit> {

@@ -240,8 +240,26 @@ impl<W: Number> LaneSymmetric<W> {
     }
 
     /// `x` with `self · x = v`, by cofactors; zero where the matrix is singular.
+    ///
+    /// The matrix is scaled to a trace of one first: the cube of what a millimetre's or a kilometre's inertia is like does
+    /// not fit.
     #[inline(always)]
     pub fn solve(&self, v: &LaneVec3<W>) -> LaneVec3<W> {
+        let scale = (self.xx + self.yy + self.zz).inverse_or_zero();
+        let m = Self {
+            xx: self.xx * scale,
+            yy: self.yy * scale,
+            zz: self.zz * scale,
+            xy: self.xy * scale,
+            xz: self.xz * scale,
+            yz: self.yz * scale,
+        };
+        m.solve_scaled(&v.scale(scale))
+    }
+
+    /// [`LaneSymmetric::solve`] for numbers near one.
+    #[inline(always)]
+    fn solve_scaled(&self, v: &LaneVec3<W>) -> LaneVec3<W> {
         let (c00, c01, c02) = (
             self.yy * self.zz - self.yz * self.yz,
             self.xz * self.yz - self.xy * self.zz,

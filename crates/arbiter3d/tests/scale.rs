@@ -1,0 +1,102 @@
+//! A world of millimetres and one of kilometres behave as one of metres: sizes, gravity and `length_unit` scaled alike.
+
+mod common;
+
+use arbiter3d::math::Vec3;
+use arbiter3d::{BodyDefinition, BodyId, Shape, ShapeDefinition, World, WorldSettings};
+use common::*;
+
+const UNITS: [f32; 3] = [1.0, 1e-3, 1e3];
+
+fn scaled_world(unit: f32) -> World {
+    let settings = WorldSettings { gravity: Vec3::Y * (-9.81 * unit), length_unit: unit, ..WorldSettings::default() };
+    let mut world = World::new(settings).unwrap();
+    let ground = Shape::cuboid(Vec3::new(50.0, 1.0, 50.0) * unit).unwrap();
+    let ground = ShapeDefinition::new(ground).at(-Vec3::Y * unit);
+    world.add_shape(BodyId::WORLD, &ground).unwrap();
+    world
+}
+
+fn shape(at: usize, unit: f32) -> Shape {
+    let [a, b, c] = [0.3 * unit, 0.2 * unit, 0.25 * unit];
+    match at % 9 {
+        0 => Shape::cylinder(a, c),
+        1 => Shape::cone(a, c),
+        2 => Shape::tapered_capsule(c, 0.12 * unit, b),
+        3 => Shape::ellipsoid(Vec3::new(a, b, c)),
+        4 => Shape::rounded(&Shape::cuboid(Vec3::new(a, b, c)).unwrap(), 0.05 * unit),
+        5 => Shape::sphere(c),
+        6 => Shape::capsule(c, b),
+        7 => Shape::cuboid(Vec3::new(a, b, c)),
+        _ => Shape::hull(&[Vec3::X * a, Vec3::Y * a, Vec3::Z * a, Vec3::new(-b, -b, -c), Vec3::new(a, a, c)]),
+    }
+    .unwrap()
+}
+
+/// One of each kind, dropped and thrown, far from the others.
+fn throw_all(unit: f32) -> (World, Vec<BodyId>) {
+    let (mut world, mut random) = (scaled_world(unit), Random(21));
+    let mut bodies = Vec::new();
+    for at in 0..27 {
+        let place = Vec3::new((at % 6) as f32 * 5.0 - 12.0, 0.5, (at / 6) as f32 * 5.0 - 10.0) * unit;
+        let body = BodyDefinition::dynamic().at(place).rotated(random.rotation());
+        let body = body.moving(Vec3::new(1.0, 0.0, 0.3) * unit, random.vector(1.0));
+        bodies.push(add(&mut world, &body, &ShapeDefinition::new(shape(at, unit)).rolling_resistance(0.05)));
+    }
+    (world, bodies)
+}
+
+/// For a second all move alike; what has come to rest lies equally high.
+#[test]
+fn thrown_shapes_move_alike_at_every_scale() {
+    let runs = UNITS.map(|unit| {
+        let (mut world, bodies) = throw_all(unit);
+        run(&mut world, 1.0);
+        let early: Vec<Vec3> = bodies.iter().map(|&body| position(&world, body) / unit).collect();
+        run(&mut world, 14.0);
+        let deepest = world.deepest_penetration() / unit;
+        let low = |body: BodyId| world.shape(world.body(body).unwrap().shapes()[0]).unwrap().aabb().min.y / unit;
+        let lowest: Vec<f32> = bodies.iter().map(|&body| low(body)).collect();
+        (early, lowest, deepest, world.awake_count())
+    });
+    let (early, ..) = &runs[0];
+    for ((other, lowest, deepest, awake), unit) in runs.iter().zip(UNITS) {
+        let apart = early.iter().zip(other).map(|(a, b)| (*a - *b).length());
+        let far: Vec<(usize, f32)> = apart.enumerate().filter(|(_, d)| *d > 0.003).collect();
+        println!("unit {unit}: apart {far:?}, deepest {deepest}, {awake} awake");
+        assert!(far.is_empty(), "unit {unit}: {far:?}");
+        assert_eq!(*awake, 0, "unit {unit}");
+        assert!(*deepest < 0.006, "unit {unit}: {deepest}");
+        for (at, low) in lowest.iter().enumerate() {
+            assert!(low.abs() < 0.006 && (low - runs[0].1[at]).abs() < 1e-3, "unit {unit}: {at} rests at {low}");
+        }
+    }
+}
+
+/// A pile of all kinds is as high and as wide at every scale.
+#[test]
+fn piles_are_alike_at_every_scale() {
+    let measures = UNITS.map(|unit| {
+        let (mut world, mut random) = (scaled_world(unit), Random(22));
+        let mut bodies = Vec::new();
+        for at in 0..90 {
+            let place = Vec3::new((at % 3) as f32 * 0.7, 0.5 + (at / 9) as f32 * 0.8, (at / 3 % 3) as f32 * 0.7);
+            let body = BodyDefinition::dynamic().at(place * unit).rotated(random.rotation());
+            bodies.push(add(&mut world, &body, &ShapeDefinition::new(shape(at, unit)).rolling_resistance(0.1)));
+        }
+        run(&mut world, 8.0);
+        let mean = |of: &dyn Fn(Vec3) -> f32| {
+            bodies.iter().map(|&body| of(position(&world, body) / unit)).sum::<f32>() / bodies.len() as f32
+        };
+        let middle = Vec3::new(0.7, 0.0, 0.7);
+        let wide = mean(&|p| Vec3::new(p.x - middle.x, 0.0, p.z - middle.z).length());
+        (mean(&|p| p.y), wide, world.deepest_penetration() / unit)
+    });
+    println!("{measures:?}");
+    let (height, wide, _) = measures[0];
+    for (other, other_wide, deepest) in measures {
+        assert_relative(other, height, 0.15, "mean height");
+        assert_relative(other_wide, wide, 0.2, "mean distance from the middle");
+        assert!(deepest < 0.03, "{deepest}");
+    }
+}
