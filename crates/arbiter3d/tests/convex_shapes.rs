@@ -229,7 +229,7 @@ fn a_can_tips_at_its_angle() {
         while degrees < 40.0 {
             degrees += 2.0 * DT;
             let gravity = turn(Vec3::Z, degrees) * (Vec3::Y * -GRAVITY);
-            world.set_settings(WorldSettings { gravity, ..world.settings().clone() }).unwrap();
+            world.set_settings(WorldSettings { gravity, ..*world.settings() }).unwrap();
             world.step(DT).unwrap();
             if (world.body(body).unwrap().rotation() * Vec3::Y).y > 0.999 {
                 stood = degrees;
