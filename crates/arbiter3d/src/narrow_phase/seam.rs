@@ -12,6 +12,9 @@
 //!   it or under it;
 //! - on the way into A, at `p − L t` for three lengths `L`, the surface goes on, and is nowhere higher than across.
 //!
+//! and the contact is not simply with the open surface at `p`, whose normal it then has: what lies in a hollow bears on it
+//! with several normals.
+//!
 //! A wall or a step rises inside A, a fence has points above the floor, behind the ridge of a roof the surface falls: none
 //! of these is a seam. A contact whose normal is as near to `m` as that of the bearing is no less true than it and never
 //! hidden, so of two contacts at most one goes. All is asked of the shapes by rays, so that it holds for boxes, hulls, meshes,
@@ -39,6 +42,11 @@ const PUSHES_IN: Real = 0.3;
 /// Normals are as near to the surface's if the squares of their distances differ by no more than this.
 const AS_NEAR: Real = 1e-8;
 
+/// A normal is that of the surface if the square of their distance is no more; of points that share a normal one has to be.
+const SAME_NORMAL: Real = 1e-7;
+/// The others may be off by more: points are given one normal where theirs differ by up to a degree.
+const ALIKE: Real = 7e-4;
+
 /// Casts a ray at all of a surface.
 pub(crate) type Cast<'a> = &'a dyn Fn(&Ray) -> Option<ShapeHit>;
 
@@ -65,7 +73,7 @@ impl Patch {
     /// Whether the contact is at a seam in a surface that there is a bearing on. `cast` casts rays at all of the surface, in
     /// the frame of the points; `scale` is the length (metres) below which edges are none.
     pub fn is_hidden_by(&self, bearing: &Bearing, cast: Cast<'_>, scale: Real) -> bool {
-        if self.is_no_seam(bearing, scale) {
+        if self.is_no_seam(bearing, scale) || self.is_on_surface(cast, scale) {
             return false;
         }
         let Some(m) = surface_normal(bearing, cast, scale) else { return false };
@@ -101,6 +109,20 @@ impl Patch {
     /// What this contact says of the surface that it is on.
     pub fn bearing(&self) -> Bearing {
         Bearing { point: self.middle(), normal: self.normal }
+    }
+
+    /// Whether the contact is with the open surface itself: what lies in a hollow bears on it with more than one normal, and
+    /// all are true.
+    fn is_on_surface(&self, cast: Cast<'_>, scale: Real) -> bool {
+        let middle = self.middle();
+        let mut exact = false;
+        let near = self.points[..self.count].iter().all(|&point| {
+            let bearing = Bearing { point: point + (middle - point) * INWARDS, normal: self.normal };
+            let off = surface_normal(&bearing, cast, scale).map(|normal| (normal - self.normal).length_squared());
+            exact |= off.is_some_and(|off| off <= SAME_NORMAL);
+            off.is_some_and(|off| off <= ALIKE)
+        });
+        near && exact
     }
 
     /// What shows without a ray that it is no seam: the same normal, or a point well above the surface that bears, as those
