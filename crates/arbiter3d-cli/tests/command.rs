@@ -240,7 +240,11 @@ fn broken_meshes_are_one_line_with_the_line_number() {
     // The note on dropped triangles comes first here: only the last line is the complaint.
     let output = folder.command(&["run", &dynamic, "--no-html"]);
     let text = String::from_utf8(output.stderr).unwrap();
-    assert!(output.status.code() == Some(2) && text.contains("bodies[0].shapes[0]: 3 edges of the mesh have no matching neighbour"), "{text}");
+    assert!(
+        output.status.code() == Some(2)
+            && text.contains("bodies[0].shapes[0]: 3 edges of the mesh have no matching neighbour"),
+        "{text}"
+    );
     let output = folder.command(&["run", &file, "--no-html", "--steps", "1"]);
     let text = String::from_utf8(output.stderr).unwrap();
     assert!(output.status.success() && text.contains("left out 1 triangles without area"), "{text}");

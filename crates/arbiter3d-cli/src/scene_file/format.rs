@@ -249,6 +249,13 @@ pub(crate) struct ShapeSpec {
     pub triangle: Option<TriangleSpec>,
     /// The shrink-wrap of points, which may be flat.
     pub point_cloud: Option<HullSpec>,
+    /// Ground by a grid of heights; for static and kinematic bodies.
+    pub height_field: Option<HeightFieldSpec>,
+    /// Solid cubic cells.
+    pub voxels: Option<VoxelsSpec>,
+    /// Placed geometries that are one shape: of each child only geometry, `scale`, `rounding`, `position`, `rotation` and
+    /// `turn` count.
+    pub compound: Option<Vec<ShapeSpec>>,
     /// Name of a mesh in `meshes`.
     pub mesh: Option<String>,
     /// Grows a convex geometry by a radius on all sides, metres. Default: not.
@@ -372,6 +379,30 @@ pub(crate) struct EllipsoidSpec {
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(crate) struct HalfSpaceSpec {}
+
+/// A grid of heights.
+#[derive(Debug, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub(crate) struct HeightFieldSpec {
+    /// Heights of the points, row by row along z, metres.
+    pub heights: Vec<Number>,
+    /// Points in a row along x, at least two.
+    pub points_per_row: usize,
+    /// From one point to the next along x and along z, metres.
+    pub cell: [Number; 2],
+}
+
+/// Solid cubic cells.
+#[derive(Debug, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub(crate) struct VoxelsSpec {
+    /// Edge of a cell, metres.
+    pub cell_size: Number,
+    /// The solid cells: cell [i, j, k] reaches from (i, j, k) to (i + 1, j + 1, k + 1) times the cell size.
+    pub cells: Vec<[i32; 3]>,
+}
 
 /// A triangle.
 #[derive(Debug, Deserialize)]

@@ -7,8 +7,8 @@ use super::format::{
 use super::{obj, parse};
 use crate::problem::{Place, Problem};
 use arbiter3d::{
-    Anisotropy, BodyDefinition, BodyKind, CombineRule, Filter, LockedAxes, Material, Shape, ShapeDefinition, World,
-    WorldSettings,
+    Anisotropy, BodyDefinition, BodyKind, CombineRule, CompoundChild, Filter, LockedAxes, Material, Shape,
+    ShapeDefinition, World, WorldSettings,
     math::{Quat, Real, Vec3},
 };
 use arbiter3d_scenes::{BuiltScene, Random, SceneOptions, turns};
@@ -272,6 +272,15 @@ fn geometry(spec: &ShapeSpec, meshes: &Meshes, path: &str) -> Result<Shape, Comp
     Ok(shape)
 }
 
+/// A part of a compound.
+fn compound_child(spec: &ShapeSpec, meshes: &Meshes, path: &str) -> Result<CompoundChild, Complaint> {
+    Ok(CompoundChild {
+        position: spec.position.map_or(Vec3::ZERO, vector),
+        rotation: rotation(spec.rotation, spec.turn, path)?,
+        ..CompoundChild::new(geometry(spec, meshes, path)?)
+    })
+}
+
 /// The one geometry that a shape is given, as it is.
 fn plain_geometry(spec: &ShapeSpec, meshes: &Meshes, path: &str) -> Result<Shape, Complaint> {
     let mut found: Vec<(&str, Result<Shape, String>)> = Vec::new();
@@ -295,6 +304,23 @@ fn plain_geometry(spec: &ShapeSpec, meshes: &Meshes, path: &str) -> Result<Shape
     add("half_space", spec.half_space.as_ref().map(|_| Ok(Shape::half_space())));
     add("triangle", spec.triangle.as_ref().map(|s| Shape::triangle(s.corners.map(vector))));
     add("point_cloud", spec.point_cloud.as_ref().map(|s| Shape::point_cloud(&points(s))));
+    add(
+        "height_field",
+        spec.height_field.as_ref().map(|s| {
+            let heights = s.heights.iter().map(|height| height.0).collect();
+            Shape::height_field(heights, s.points_per_row, s.cell.map(|cell| cell.0))
+        }),
+    );
+    add("voxels", spec.voxels.as_ref().map(|s| Shape::voxels(s.cell_size.0, s.cells.iter().copied())));
+    if let Some(children) = &spec.compound {
+        let path = format!("{path}.compound");
+        let children = children
+            .iter()
+            .enumerate()
+            .map(|(index, child)| compound_child(child, meshes, &format!("{path}[{index}]")))
+            .collect::<Result<Vec<_>, _>>()?;
+        add("compound", Some(Shape::compound(&children)));
+    }
     if let Some(name) = &spec.mesh {
         let known = || meshes.keys().map(|name| format!("{name:?}")).collect::<Vec<_>>().join(", ");
         let missing = || format!("there is no mesh {name:?} in \"meshes\", which has: {}", known());
