@@ -258,6 +258,9 @@ pub(crate) struct ShapeSpec {
     pub compound: Option<Vec<ShapeSpec>>,
     /// Name of a mesh in `meshes`.
     pub mesh: Option<String>,
+    /// Cuts a closed mesh into convex hulls, of which at most this share (above 0) may be empty: 0.05 is a good start.
+    /// Default: the mesh as it is.
+    pub decompose: Option<Number>,
     /// Grows a convex geometry by a radius on all sides, metres. Default: not.
     pub rounding: Option<Number>,
     /// Multiplies the geometry along its axes, before `rounding`; negative numbers mirror. Default [1, 1, 1].

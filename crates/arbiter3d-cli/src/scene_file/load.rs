@@ -7,8 +7,8 @@ use super::format::{
 use super::{obj, parse};
 use crate::problem::{Place, Problem};
 use arbiter3d::{
-    Anisotropy, BodyDefinition, BodyKind, CombineRule, CompoundChild, Filter, LockedAxes, Material, Shape,
-    ShapeDefinition, World, WorldSettings,
+    Anisotropy, BodyDefinition, BodyKind, CombineRule, CompoundChild, DecompositionSettings, Filter, LockedAxes,
+    Material, Shape, ShapeDefinition, World, WorldSettings,
     math::{Quat, Real, Vec3},
 };
 use arbiter3d_scenes::{BuiltScene, Random, SceneOptions, turns};
@@ -263,6 +263,9 @@ fn shape_definition(spec: &ShapeSpec, meshes: &Meshes, path: &str) -> Result<Sha
 fn geometry(spec: &ShapeSpec, meshes: &Meshes, path: &str) -> Result<Shape, Complaint> {
     let mut shape = plain_geometry(spec, meshes, path)?;
     let complain = |name: &str, error: arbiter3d::ShapeError| (format!("{path}.{name}"), error.to_string());
+    if let Some(Number(concavity)) = spec.decompose {
+        shape = decomposed(&shape, concavity).map_err(|message| (format!("{path}.decompose"), message))?;
+    }
     if let Some(scale) = spec.scale {
         shape = shape.scaled(vector(scale)).map_err(|error| complain("scale", error))?;
     }
@@ -270,6 +273,15 @@ fn geometry(spec: &ShapeSpec, meshes: &Meshes, path: &str) -> Result<Shape, Comp
         shape = Shape::rounded(&shape, radius).map_err(|error| complain("rounding", error))?;
     }
     Ok(shape)
+}
+
+/// Convex hulls instead of a mesh.
+fn decomposed(shape: &Shape, concavity: Real) -> Result<Shape, String> {
+    let Shape::Mesh(mesh) = shape else { return Err("only a mesh can be cut into convex hulls".to_owned()) };
+    let settings = DecompositionSettings { concavity, ..DecompositionSettings::default() };
+    let hulls = mesh.convex_decomposition(&settings).map_err(|error| error.to_string())?;
+    let children: Vec<_> = hulls.into_iter().map(|hull| CompoundChild::new(Shape::Hull(hull.into()))).collect();
+    Shape::compound(&children).map_err(|error| error.to_string())
 }
 
 /// A part of a compound.
