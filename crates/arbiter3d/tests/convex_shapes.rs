@@ -7,9 +7,9 @@ use arbiter3d::narrow_phase::{Manifold, PairCache, collide};
 use arbiter3d::{BodyDefinition, BodyId, ConvexShape, Shape, ShapeDefinition, World, WorldSettings};
 use common::*;
 
-/// The upper half of a ball, with nothing but its support function and its centre of mass.
+/// The upper half of a ball, with its support function, its centre of mass and the radius with which it rolls.
 #[derive(Debug)]
-struct HalfBall(f32);
+struct HalfBall(f32, f32);
 
 impl ConvexShape for HalfBall {
     fn support(&self, direction: Vec3) -> Vec3 {
@@ -19,6 +19,10 @@ impl ConvexShape for HalfBall {
 
     fn center(&self) -> Vec3 {
         Vec3::new(0.0, 0.375 * self.0, 0.0)
+    }
+
+    fn rounding_radius(&self) -> f32 {
+        self.1
     }
 }
 
@@ -64,8 +68,8 @@ fn lying_shapes() -> Vec<Lying> {
             turn(Vec3::Z, -90.0 - lean),
             slope * h + top,
         ),
-        of("half ball", Shape::custom(HalfBall(0.3)).unwrap(), upright, 0.0),
-        of("half ball on its round side", Shape::custom(HalfBall(0.3)).unwrap(), turn(Vec3::X, 180.0), 0.3),
+        of("half ball", Shape::custom(HalfBall(0.3, 0.0)).unwrap(), upright, 0.0),
+        of("half ball on its round side", Shape::custom(HalfBall(0.3, 0.0)).unwrap(), turn(Vec3::X, 180.0), 0.3),
     ]
 }
 
@@ -144,7 +148,7 @@ fn mixed(at: usize) -> Shape {
         2 => rounded_box(),
         3 => Shape::ellipsoid(Vec3::new(0.35, 0.2, 0.25)).unwrap(),
         4 => Shape::tapered_capsule(0.25, 0.12, 0.2).unwrap(),
-        5 => Shape::custom(HalfBall(0.3)).unwrap(),
+        5 => Shape::custom(HalfBall(0.3, 0.3)).unwrap(),
         6 => Shape::rounded(&Shape::cylinder(0.15, 0.2).unwrap(), 0.05).unwrap(),
         _ => {
             let corner = |i: u32| {
@@ -315,7 +319,7 @@ fn rocking_and_spinning_gain_no_energy() {
 /// A half ball that rocks on its round side, told by its support alone, does as a ball with the same mass and centre of mass.
 #[test]
 fn a_half_ball_rocks_like_a_weighted_ball() {
-    let dome = Shape::custom(HalfBall(0.3)).unwrap();
+    let dome = Shape::custom(HalfBall(0.3, 0.0)).unwrap();
     let mass = dome.mass_properties(1000.0).unwrap();
     let runs = [dome, sphere(0.3)].map(|shape| {
         let mut world = sleepless();
@@ -358,7 +362,7 @@ fn all_kinds_fall_asleep() {
 fn a_custom_half_ball_rests_and_rolls() {
     let mut world = world();
     floor(&mut world, 0.6);
-    let shape = ShapeDefinition::new(Shape::custom(HalfBall(0.3)).unwrap()).rolling_resistance(0.02);
+    let shape = ShapeDefinition::new(Shape::custom(HalfBall(0.3, 0.0)).unwrap()).rolling_resistance(0.02);
     let flat = add(&mut world, &BodyDefinition::dynamic().at(Vec3::Y * 0.3), &shape);
     let round = BodyDefinition::dynamic().at(Vec3::new(3.0, 0.3, 0.0)).rotated(turn(Vec3::X, 180.0));
     let round = add(&mut world, &round.moving(Vec3::ZERO, Vec3::Z * 3.0), &shape);

@@ -36,6 +36,11 @@ impl ConvexShape for Lens {
     fn center(&self) -> Vec3 {
         Vec3::ZERO
     }
+
+    /// Each side is part of a ball.
+    fn rounding_radius(&self) -> Real {
+        self.scale
+    }
 }
 
 /// One of each kind, about half a metre large.

@@ -22,6 +22,8 @@ use glam::{DMat3, DVec3};
 
 /// Lines whose angle has a sine below this are parallel: two points.
 const PARALLEL_SINE: Real = 0.05;
+/// But only as far as they lie side by side, seen along the normal, by less than this share of the smaller size.
+const ASIDE: Real = 0.04;
 /// The corners miss the closest point if they are all farther by this share of the smaller size.
 pub(super) const MISSED: Real = 1e-4;
 /// Corners of two features clipped by each other at most.
@@ -89,7 +91,7 @@ impl Touch {
         let figure1 = Figure::new(feature1, |point| view.see(point));
         let figure2 = Figure::new(feature2, |point| view.see(placed.place(point)));
         let mut corners = [ClipPoint::default(); CLIPPED];
-        let count = figure1.overlap(&figure2, &mut corners);
+        let count = figure1.overlap(&figure2, ASIDE * size, &mut corners);
         let mut kept = 0;
         for k in 0..count {
             let p = corners[k].position;
@@ -202,18 +204,18 @@ impl Figure {
     }
 
     /// Corners of what two figures share; none where one of them is a point, or lines cross: the closest point says it all.
-    fn overlap(&self, other: &Self, out: &mut [ClipPoint; CLIPPED]) -> usize {
+    fn overlap(&self, other: &Self, aside: Real, out: &mut [ClipPoint; CLIPPED]) -> usize {
         match (self.count, other.count) {
             (0 | 1, _) | (_, 0 | 1) => 0,
-            (2, 2) => self.shared_stretch(other, out),
+            (2, 2) => self.shared_stretch(other, aside, out),
             (2, _) => other.clip_line(self, out),
             (_, 2) => self.clip_line(other, out),
             _ => self.clip_face(other, out),
         }
     }
 
-    /// Ends of the stretch that two parallel lines share.
-    fn shared_stretch(&self, other: &Self, out: &mut [ClipPoint; CLIPPED]) -> usize {
+    /// Ends of the stretch that two parallel lines share: where they are no farther apart than `aside`.
+    fn shared_stretch(&self, other: &Self, aside: Real, out: &mut [ClipPoint; CLIPPED]) -> usize {
         let flat = |v: Vec3| Vec3::new(v.x, v.y, 0.0);
         let (a, along) = (flat(self.corners[0]), flat(self.corners[1] - self.corners[0]));
         let other_along = flat(other.corners[1] - other.corners[0]);
@@ -223,15 +225,32 @@ impl Figure {
             return 0;
         }
         let [p, q] = [other.corners[0], other.corners[1]].map(|end| flat(end - a).dot(along) / squared);
+        let own = |share: Real| a + along * share;
+        let there = |share: Real| flat(other.corners[0]) + other_along * clamp((share - p) / (q - p), 0.0, 1.0);
         let (low, high) = (max(min(p, q), 0.0), min(max(p, q), 1.0));
-        if high - low < 1e-3 {
+        // How far the other line is to the left, which changes evenly along them.
+        let left = |share: Real| {
+            let way = there(share) - own(share);
+            (along.x * way.y - along.y * way.x) / squared.sqrt()
+        };
+        let (first, last) = (left(low), left(high));
+        let reach = |limit: Real| low + (high - low) * ((limit - first) / (last - first));
+        let (mut from, mut to) = (low, high);
+        for sign in [1.0, -1.0] {
+            match (first * sign > aside, last * sign > aside) {
+                (true, true) => return 0,
+                (true, false) => from = max(reach(sign * aside), from),
+                (false, true) => to = min(reach(sign * aside), to),
+                (false, false) => {}
+            }
+        }
+        if to - from < 1e-3 {
             return 0;
         }
-        for (k, share) in [low, high].into_iter().enumerate() {
-            // Half way between the two lines.
-            let own = a + along * share;
-            let there = flat(other.corners[0]) + other_along * clamp((share - p) / (q - p), 0.0, 1.0);
-            out[k] = ClipPoint { position: (own + there) * 0.5, separation: 0.0, feature: k as u32 + 1 };
+        for (k, share) in [from, to].into_iter().enumerate() {
+            // Half way between the two lines: neither is preferred.
+            let position = (own(share) + there(share)) * 0.5;
+            out[k] = ClipPoint { position, separation: 0.0, feature: k as u32 + 1 };
         }
         2
     }

@@ -1,12 +1,14 @@
 //! Point clouds: the convex hull of points, wrapped around them by the support map alone.
 //!
-//! No faces are built, so the points may be flat, few or many. A hull ([`ConvexHull`](super::ConvexHull)) is faster in
-//! contacts where the points have volume and their hull at most 255 corners.
+//! No faces are built ahead, so the points may be flat, few or many: the one that a contact asks for is found by gift
+//! wrapping (Chand and Kapur, "An Algorithm for Convex Polytopes", 1970) around the furthest point. A hull
+//! ([`ConvexHull`](super::ConvexHull)) is faster in contacts where the points have volume and their hull at most 255
+//! corners.
 
-use super::convex::{Feature, sampled_feature, sphere_grid};
+use super::convex::{FEATURE_POINTS, Feature, sampled_feature, sphere_grid};
 use super::geometry::Geometry;
 use super::{ConvexHull, MassProperties, ShapeError};
-use crate::math::{Aabb, Pose, Real, Vec3, max};
+use crate::math::{Aabb, Pose, Real, Vec3, max, tangents};
 use crate::narrow_phase::Support;
 use crate::query::{Ray, ShapeHit, cast_support};
 use glam::DVec3;
@@ -67,9 +69,82 @@ impl PointCloud {
         &self.points
     }
 
+    /// The face around the point that is furthest along `d`; where all faces there look away, or where there are none,
+    /// what samples tell.
     pub(crate) fn feature(&self, d: Vec3, out: &mut Feature) {
-        let size = 0.5 * self.aabb.half_extents().length();
-        sampled_feature(&|d| outermost(&self.points, d.as_dvec3()).1.as_vec3(), d, size, out);
+        let d = d.as_dvec3();
+        let (_, top) = outermost(&self.points, d);
+        let face = self.face_around(top, d).filter(|normal| normal.dot(d) > 0.5);
+        match face {
+            Some(normal) => self.outline(top, normal, out),
+            None => {
+                let size = 0.5 * self.aabb.half_extents().length();
+                sampled_feature(&|d| outermost(&self.points, d.as_dvec3()).1.as_vec3(), d.as_vec3(), size, out);
+            }
+        }
+    }
+
+    /// Normal of the hull's face that a plane through `top` square to `d` meets first: tilted about the point towards
+    /// the one that takes the least tilt, then turned about the edge to that, to the side where the face looks more
+    /// along `d`.
+    fn face_around(&self, top: DVec3, d: DVec3) -> Option<DVec3> {
+        let least = |normal: DVec3, aside: &dyn Fn(DVec3) -> f64| {
+            let (mut best, mut slope) = (None, f64::MIN);
+            for point in &self.points {
+                let way = point.as_dvec3() - top;
+                let far = aside(way);
+                // Points on the edge itself have no side.
+                if far > 1e-6 * way.length() && normal.dot(way) > slope * far {
+                    (best, slope) = (Some(way), normal.dot(way) / far);
+                }
+            }
+            best
+        };
+        let edge = least(d, &|way| (way - d * d.dot(way)).length())?;
+        let across = edge.cross(d).normalize_or_zero();
+        let tilted = across.cross(edge).normalize_or_zero();
+        let mut found: Option<DVec3> = None;
+        for side in [across, -across] {
+            let Some(way) = least(tilted, &|way| side.dot(way)) else { continue };
+            let normal = edge.cross(way).normalize_or_zero();
+            let normal = if normal.dot(tilted) < 0.0 { -normal } else { normal };
+            if found.is_none_or(|other| normal.dot(d) > other.dot(d) + 1e-3) {
+                found = Some(normal);
+            }
+        }
+        found
+    }
+
+    /// The corners of the face through `top` with this normal, counter-clockwise: each time the rightmost point.
+    fn outline(&self, top: DVec3, normal: DVec3, out: &mut Feature) {
+        let thickness = 1e-5 * self.aabb.half_extents().as_dvec3().length();
+        let on_face = |point: &&Vec3| normal.dot(point.as_dvec3() - top).abs() <= thickness;
+        let (t1, _) = tangents(normal.as_vec3());
+        let first = self.points.iter().filter(on_face).fold(top, |best, point| {
+            let point = point.as_dvec3();
+            if point.dot(t1.as_dvec3()) > best.dot(t1.as_dvec3()) { point } else { best }
+        });
+        let mut corner = first;
+        for _ in 0..FEATURE_POINTS {
+            out.push(corner.as_vec3());
+            let mut next = corner;
+            for point in self.points.iter().filter(on_face) {
+                let (way, best) = (point.as_dvec3() - corner, next - corner);
+                if way.length_squared() <= thickness * thickness {
+                    continue;
+                }
+                let right = normal.dot(way.cross(best));
+                let level = 1e-9 * way.length() * best.length();
+                let farther = right >= -level && way.length_squared() > best.length_squared();
+                if next == corner || right > level || farther && right.abs() <= level {
+                    next = point.as_dvec3();
+                }
+            }
+            if (next - first).length_squared() <= thickness * thickness {
+                break;
+            }
+            corner = next;
+        }
     }
 }
 
