@@ -102,6 +102,18 @@ impl<T: Copy, const N: usize> FixedList<T, N> {
         // SAFETY: `push` has written the first `count`, and `MaybeUninit<T>` lies in memory as `T` does.
         unsafe { std::slice::from_raw_parts(self.entries.as_ptr().cast(), self.count) }
     }
+
+    #[inline(always)]
+    pub fn as_mut_slice(&mut self) -> &mut [T] {
+        // SAFETY: as above.
+        unsafe { std::slice::from_raw_parts_mut(self.entries.as_mut_ptr().cast(), self.count) }
+    }
+
+    /// Drops all but the first `count` entries.
+    #[inline(always)]
+    pub fn truncate(&mut self, count: usize) {
+        self.count = count.min(self.count);
+    }
 }
 
 #[cfg(test)]

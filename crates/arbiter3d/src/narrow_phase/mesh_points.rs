@@ -10,6 +10,7 @@
 //! a box in a groove two on each side.
 
 use crate::math::{Real, Vec3, max, min, tangents};
+use crate::storage::FixedList;
 
 /// The normal of a point is not that of a triangle.
 pub(super) const NO_FACET: u32 = u32::MAX;
@@ -34,11 +35,6 @@ pub(super) fn position_number(corner: Vec3) -> u32 {
     let [x, y, z] = corner.to_array().map(Real::to_bits);
     let mixed = (x ^ 0x5bd1_e995).wrapping_mul(0x9e37_79b1).rotate_left(15) ^ y.wrapping_mul(0x85eb_ca6b);
     (mixed.rotate_left(13) ^ z).wrapping_mul(0x2c1b_3c6d) ^ mixed >> 16
-}
-
-impl Candidate {
-    const NONE: Self =
-        Self { position: Vec3::ZERO, normal: Vec3::ZERO, separation: 0.0, feature: 0, facet: NO_FACET, triangle: 0 };
 }
 
 /// Points that the buffer holds.
@@ -67,8 +63,7 @@ const ALL_GROUPS: u8 = u8::MAX;
 
 /// The points found so far.
 pub(super) struct Candidates {
-    list: [Candidate; CAPACITY],
-    count: usize,
+    list: FixedList<Candidate, CAPACITY>,
     /// Length below which points do not differ, metres.
     tolerance: Real,
     /// The least separation of all points.
@@ -78,15 +73,26 @@ pub(super) struct Candidates {
 /// Points by group.
 struct Groups {
     of: [u8; CAPACITY],
-    normals: [Vec3; CAPACITY],
-    count: usize,
+    normals: FixedList<Vec3, CAPACITY>,
+}
+
+impl Groups {
+    #[inline(always)]
+    fn count(&self) -> usize {
+        self.normals.as_slice().len()
+    }
+
+    #[inline(always)]
+    fn normal(&self, group: usize) -> Vec3 {
+        self.normals.as_slice()[group]
+    }
 }
 
 impl Candidates {
     // Inlined, so that the list is made where it stays.
     #[inline(always)]
     pub(super) fn new(tolerance: Real) -> Self {
-        Self { list: [Candidate::NONE; CAPACITY], count: 0, tolerance, deepest: Real::MAX }
+        Self { list: FixedList::new(), tolerance, deepest: Real::MAX }
     }
 
     /// The least separation of all points that were added, also of those dropped since.
@@ -99,29 +105,28 @@ impl Candidates {
         if !(candidate.separation.is_finite() && candidate.position.is_finite() && candidate.normal.is_finite()) {
             return;
         }
-        if self.count == CAPACITY {
+        if self.list.as_slice().len() == CAPACITY {
             self.thin_out();
         }
         if candidate.separation < self.deepest {
             self.deepest = candidate.separation;
         }
-        self.list[self.count] = candidate;
-        self.count += 1;
+        self.list.push(candidate);
     }
 
     /// Hands out the four points that matter most, or fewer.
     pub(super) fn choose(&mut self, mut take: impl FnMut(&Candidate)) {
-        if self.count == 0 {
+        if self.list.as_slice().is_empty() {
             return;
         }
         self.unite_normals();
         let groups = self.group(4);
         let mut chosen = Chosen { points: [[0; 4]; 4], counts: [0; 4] };
-        for group in 0..groups.count {
+        for group in 0..groups.count() {
             chosen.add(group, self.deepest_of(&groups, group));
         }
-        let (touching, limit) = self.touching(&chosen, groups.count);
-        for _ in groups.count..4 {
+        let (touching, limit) = self.touching(&chosen, groups.count());
+        for _ in groups.count()..4 {
             let next = match self.most_useful(&groups, &chosen, touching, limit) {
                 (Some(bearing), Some(widest))
                     if bearing.2 >= BEARING_SHARES[chosen.counts[bearing.0] - 1] * widest.2 =>
@@ -134,12 +139,12 @@ impl Candidates {
             let Some((group, index, _)) = next else { break };
             chosen.add(group, index);
         }
-        for group in 0..groups.count {
-            let widened = if groups.count > 1 { self.widened(&groups, &chosen, group) } else { None };
+        for group in 0..groups.count() {
+            let widened = if groups.count() > 1 { self.widened(&groups, &chosen, group) } else { None };
             for (k, &index) in chosen.points[group][..chosen.counts[group]].iter().enumerate() {
                 match widened {
                     Some((place, candidate)) if place == k => take(&candidate),
-                    _ => take(&self.list[index]),
+                    _ => take(&self.list.as_slice()[index]),
                 }
             }
         }
@@ -148,7 +153,7 @@ impl Candidates {
     /// The groups that come about as near as the nearest one, a bit for each, and the separation up to which points do:
     /// what stands off (a wall beside a box on a floor) bears nothing yet, and one point is enough to stop at it.
     fn touching(&self, chosen: &Chosen, groups: usize) -> (u8, Real) {
-        let nearest = |group: usize| self.list[chosen.points[group][0]].separation;
+        let nearest = |group: usize| self.list.as_slice()[chosen.points[group][0]].separation;
         let least = (0..groups).fold(Real::MAX, |m, group| min(m, nearest(group)));
         let limit = max(least, 0.0) + STANDS_OFF * self.tolerance;
         ((0..groups).filter(|&group| nearest(group) <= limit).fold(0, |mask, group| mask | 1 << group), limit)
@@ -160,10 +165,10 @@ impl Candidates {
         if chosen.counts[group] != 3 {
             return None;
         }
-        let [a, b, c] = [0, 1, 2].map(|k| &self.list[chosen.points[group][k]]);
-        let area = groups.normals[group].dot((b.position - a.position).cross(c.position - a.position)).abs();
+        let [a, b, c] = [0, 1, 2].map(|k| &self.list.as_slice()[chosen.points[group][k]]);
+        let area = groups.normal(group).dot((b.position - a.position).cross(c.position - a.position)).abs();
         let (_, fourth, gain) = self.most_useful(groups, chosen, 1 << group, Real::MAX).1?;
-        let fourth = &self.list[fourth];
+        let fourth = &self.list.as_slice()[fourth];
         if gain < WORTH_WIDENING * area {
             return None;
         }
@@ -179,23 +184,24 @@ impl Candidates {
 
     /// Gives points with almost the same normal the very same, that of a triangle if there is one among them.
     fn unite_normals(&mut self) {
-        let first = self.list[0].normal;
-        if self.list[..self.count].iter().all(|c| c.normal == first) {
+        let list = self.list.as_mut_slice();
+        let first = list[0].normal;
+        if list.iter().all(|c| c.normal == first) {
             return;
         }
         let mut leaders = [0_u8; CAPACITY];
         let mut count = 0;
         for faces in [true, false] {
-            for i in 0..self.count {
-                let candidate = self.list[i];
+            for i in 0..list.len() {
+                let candidate = list[i];
                 if (candidate.facet != NO_FACET) != faces {
                     continue;
                 }
-                let same = |&&leader: &&u8| self.list[leader as usize].normal.dot(candidate.normal) > SAME_NORMAL;
+                let same = |&&leader: &&u8| list[leader as usize].normal.dot(candidate.normal) > SAME_NORMAL;
                 if let Some(&leader) = leaders[..count].iter().find(same) {
-                    let leader = self.list[leader as usize];
-                    self.list[i].normal = leader.normal;
-                    self.list[i].facet = leader.facet;
+                    let leader = list[leader as usize];
+                    list[i].normal = leader.normal;
+                    list[i].facet = leader.facet;
                 } else {
                     leaders[count] = i as u8;
                     count += 1;
@@ -206,19 +212,18 @@ impl Candidates {
 
     /// Groups the points by normal into at most `limit` groups.
     fn group(&self, limit: usize) -> Groups {
-        let mut groups = Groups { of: [0; CAPACITY], normals: [Vec3::ZERO; CAPACITY], count: 0 };
+        let mut groups = Groups { of: [0; CAPACITY], normals: FixedList::new() };
         for cosine in MERGE {
-            groups.count = 0;
-            for (i, candidate) in self.list[..self.count].iter().enumerate() {
-                let known = groups.normals[..groups.count].iter().position(|n| n.dot(candidate.normal) > cosine);
-                let group = known.unwrap_or(groups.count);
+            groups.normals.truncate(0);
+            for (i, candidate) in self.list.as_slice().iter().enumerate() {
+                let known = groups.normals.as_slice().iter().position(|n| n.dot(candidate.normal) > cosine);
+                let group = known.unwrap_or(groups.count());
                 if known.is_none() {
-                    groups.normals[group] = candidate.normal;
-                    groups.count += 1;
+                    groups.normals.push(candidate.normal);
                 }
                 groups.of[i] = group as u8;
             }
-            if groups.count <= limit {
+            if groups.count() <= limit {
                 break;
             }
         }
@@ -227,7 +232,7 @@ impl Candidates {
 
     /// The points of a group, with their places in the list.
     fn members<'a>(&'a self, groups: &'a Groups, group: usize) -> impl Iterator<Item = (usize, &'a Candidate)> {
-        let all = self.list[..self.count].iter().enumerate();
+        let all = self.list.as_slice().iter().enumerate();
         all.filter(move |(i, _)| groups.of[*i] as usize == group)
     }
 
@@ -235,7 +240,7 @@ impl Candidates {
     /// rather than a point inside it, and the same one in every step.
     fn deepest_of(&self, groups: &Groups, group: usize) -> usize {
         let least = self.members(groups, group).fold(Real::MAX, |m, (_, c)| min(m, c.separation));
-        let (t1, t2) = tangents(groups.normals[group]);
+        let (t1, t2) = tangents(groups.normal(group));
         let outwards = t1 + t2 * 0.618;
         let mut best = (0, -Real::MAX);
         for (i, candidate) in self.members(groups, group) {
@@ -252,13 +257,13 @@ impl Candidates {
     fn most_useful(&self, groups: &Groups, chosen: &Chosen, mask: u8, limit: Real) -> (Option<Gain>, Option<Gain>) {
         let (mut near, mut any) = (None, None);
         let mut most = [self.tolerance * self.tolerance; 2];
-        let corners = chosen.points.map(|points| points.map(|j| self.list[j].position));
-        for (i, candidate) in self.list[..self.count].iter().enumerate() {
+        let corners = chosen.points.map(|points| points.map(|j| self.list.as_slice()[j].position));
+        for (i, candidate) in self.list.as_slice().iter().enumerate() {
             let group = groups.of[i] as usize;
             if mask >> group & 1 == 0 {
                 continue;
             }
-            let gain = gain(&corners[group][..chosen.counts[group]], candidate.position, groups.normals[group]);
+            let gain = gain(&corners[group][..chosen.counts[group]], candidate.position, groups.normal(group));
             if gain > most[0] * TIE && candidate.separation <= limit {
                 (most[0], near) = (gain, Some((group, i, gain)));
             }
@@ -274,8 +279,8 @@ impl Candidates {
         const DIAGONAL: Real = std::f32::consts::FRAC_1_SQRT_2;
         let groups = self.group(MOST_GROUPS);
         let mut keep = [false; CAPACITY];
-        for group in 0..groups.count {
-            let (t1, t2) = tangents(groups.normals[group]);
+        for group in 0..groups.count() {
+            let (t1, t2) = tangents(groups.normal(group));
             let (d1, d2) = ((t1 + t2) * DIAGONAL, (t1 - t2) * DIAGONAL);
             keep[self.deepest_of(&groups, group)] = true;
             for direction in [t1, -t1, t2, -t2, d1, -d1, d2, -d2] {
@@ -291,10 +296,10 @@ impl Candidates {
         }
         let mut count = 0;
         for (i, _) in keep.iter().enumerate().filter(|(_, kept)| **kept) {
-            self.list[count] = self.list[i];
+            self.list.as_mut_slice()[count] = self.list.as_slice()[i];
             count += 1;
         }
-        self.count = count;
+        self.list.truncate(count);
     }
 }
 

@@ -194,7 +194,9 @@ const BENT: u8 = 2;
 struct Side {
     end: u32,
     triangle: u32,
-    edge: u32,
+    edge: u8,
+    /// Whether the triangle goes towards that end.
+    forward: bool,
 }
 
 impl<'a> Adjacency<'a> {
@@ -215,7 +217,7 @@ impl<'a> Adjacency<'a> {
             for group in at_corner.chunk_by(|a, b| a.end == b.end) {
                 adjacency.open_edges += adjacency.unmatched(group);
                 inwards.clear();
-                inwards.extend(group.iter().map(|side| surface.inward(side.triangle, side.edge)));
+                inwards.extend(group.iter().map(|side| surface.inward(side.triangle, u32::from(side.edge))));
                 for (k, side) in group.iter().enumerate() {
                     let others = group.iter().zip(&inwards).filter(|(other, _)| other.triangle != side.triangle);
                     adjacency.join(side, inwards[k], others.map(|(other, inward)| (other.triangle, *inward)));
@@ -231,8 +233,7 @@ impl<'a> Adjacency<'a> {
     }
 
     fn unmatched(&self, sides: &[Side]) -> usize {
-        let forward = |side: &&Side| self.welded_corner(side.triangle, side.edge as usize) != side.end;
-        let forward = sides.iter().filter(forward).count();
+        let forward = sides.iter().filter(|side| side.forward).count();
         forward.abs_diff(sides.len() - forward)
     }
 
@@ -246,7 +247,7 @@ impl<'a> Adjacency<'a> {
         let triangles = self.surface.triangles.len() as u32;
         let ends = |triangle: u32, edge: usize| {
             let (a, b) = (self.welded_corner(triangle, edge), self.welded_corner(triangle, edge + 1));
-            (a.min(b), a.max(b))
+            (a.min(b), a.max(b), b > a)
         };
         let mut first = vec![0; self.welded.len() + 1];
         for triangle in 0..triangles {
@@ -263,9 +264,9 @@ impl<'a> Adjacency<'a> {
         let mut sides = vec![Side::default(); sum as usize];
         for triangle in 0..triangles {
             for edge in 0..3 {
-                let (start, end) = ends(triangle, edge);
+                let (start, end, forward) = ends(triangle, edge);
                 first[start as usize] -= 1;
-                sides[first[start as usize] as usize] = Side { end, triangle, edge: edge as u32 };
+                sides[first[start as usize] as usize] = Side { end, triangle, edge: edge as u8, forward };
             }
         }
         (first, sides)
@@ -321,7 +322,7 @@ impl<'a> Adjacency<'a> {
                 let own = surface.inward(index, edge);
                 // What folds back onto the triangle itself is a second sheet, not its continuation.
                 let ahead = others.into_iter().filter(|(_, u)| u.dot(own) < 0.99);
-                self.join(&Side { end: 0, triangle: index, edge }, own, ahead);
+                self.join(&Side { end: 0, triangle: index, edge: edge as u8, forward: true }, own, ahead);
             }
         }
     }

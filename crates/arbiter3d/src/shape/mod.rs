@@ -523,7 +523,13 @@ impl Shape {
     /// The box around the shape in its own frame.
     #[must_use]
     pub fn local_aabb(&self) -> Aabb {
-        self.geometry().local_aabb()
+        match self {
+            Self::Sphere(s) => s.local_aabb(),
+            Self::Capsule(s) => s.local_aabb(),
+            Self::Cuboid(s) => s.local_aabb(),
+            Self::Hull(s) => s.local_aabb(),
+            other => other.geometry().local_aabb(),
+        }
     }
 
     /// The box around the shape placed by `pose`.
@@ -552,7 +558,13 @@ impl Shape {
     /// what else has no inside.
     #[must_use]
     pub fn inner_radius(&self) -> Real {
-        self.inner_ball().1
+        match self {
+            Self::Sphere(s) => s.radius(),
+            Self::Capsule(s) => s.radius(),
+            Self::Cuboid(s) => s.half_extents().min_element(),
+            Self::Hull(s) => s.inner_radius(),
+            other => other.inner_ball().1,
+        }
     }
 
     /// Centre and radius of a ball that fits inside.

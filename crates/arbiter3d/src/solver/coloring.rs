@@ -102,10 +102,10 @@ impl Record {
         Self {
             bodies: [arbiter.body1.index, arbiter.body2.index],
             arbiter: index,
-            rows: match data.flags & (ONE_NORMAL | HIDDEN) {
-                ONE_NORMAL => u16::from(data.usage_mask & 15),
-                0 => rows_of(data),
-                _ => 0,
+            rows: if data.flags & (ONE_NORMAL | HIDDEN) == ONE_NORMAL {
+                u16::from(data.usage_mask & 15)
+            } else {
+                rows_of(data)
             },
             moves: states.map(|state| state.moves != 0),
             extra,
@@ -116,7 +116,7 @@ impl Record {
 
 /// Splits the slots of an arbiter into groups of equal normal and mode; each is a row.
 fn rows_of(data: &ContactData) -> u16 {
-    let mut left = data.usage_mask & 15;
+    let mut left = if data.flags & HIDDEN == 0 { data.usage_mask & 15 } else { 0 };
     let (mut rows, mut count) = (0, 0);
     while left != 0 {
         let lead = &data.slots[left.trailing_zeros() as usize];

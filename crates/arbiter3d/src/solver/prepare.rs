@@ -82,7 +82,9 @@ pub(crate) fn prepare_row<W: Lanes<L>, const L: usize, const P: usize, const C: 
     context: &PrepareContext<'_>,
 ) {
     let RowTarget { row, friction, mut extra, features } = target;
-    *features = features_of(sources, context);
+    // Without an extra row the plan has found that none is needed.
+    let asked = extra.is_some() || cfg!(debug_assertions);
+    *features = if asked { features_of(sources, context) } else { RowFeatures::default() };
     let mut gathered = gather_bodies((row, extra.as_deref_mut(), features), sources, context);
     let (frame1, frame2) = (gathered.1, gathered.2);
     gather_points(row, &mut gathered.0, (&frame1, &frame2), (sources, context));

@@ -309,7 +309,9 @@ impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> RowPass<'_, W,
         let wanted2 = old2 - (friction.mass12 * slip1 + friction.mass22 * slip2);
         let scale = cone_scale(wanted1 * wanted1 + wanted2 * wanted2, friction.friction * load);
         (friction.impulse1, friction.impulse2) = (wanted1 * scale, wanted2 * scale);
-        if let (true, Some(extra)) = (self.features.anisotropic, &self.extra) {
+        if let Some(extra) = &self.extra
+            && self.features.anisotropic
+        {
             let limit = friction.friction * load;
             let (on1, on2) = on_ellipse(friction, [wanted1, wanted2], extra.ratio, limit);
             friction.impulse1 = extra.ratio.if_positive(on1, friction.impulse1);

@@ -731,8 +731,11 @@ impl World {
         };
         let moves = dynamic && (free_linear != Vec3::ZERO || free_angular != Vec3::ZERO);
         let state = &mut self.solver_bodies.states[index as usize];
-        state.moves = u32::from(moves);
+        let moved = std::mem::replace(&mut state.moves, u32::from(moves)) != 0;
         state.locked = u32::from(moves && free_linear != Vec3::ONE);
+        if moved != moves {
+            self.refresh_bearings(index);
+        }
     }
 
     pub(crate) fn end_arbiters_of(&mut self, index: u32, reason: EndReason) {

@@ -94,6 +94,8 @@ pub struct World {
     free_pairs: Vec<u32>,
     /// The pairs of each body.
     pair_lists: EdgeLists,
+    /// By body: how many pairs it has with what nothing can push, sensors left out.
+    bearings: Vec<u32>,
     pair_set: PairSet,
     active_pairs: pairs::PlaceSet,
     arbiters: ArbiterStore,
@@ -131,7 +133,7 @@ pub struct World {
     kinematic_shapes: Vec<continuous::KinematicShape>,
     member_scratch: Vec<(u32, u32)>,
     /// Bodies of new pairs, and whether one is awake.
-    tie_scratch: Vec<([u32; 2], bool)>,
+    tie_scratch: Vec<pairs::Tie>,
 }
 
 impl std::fmt::Debug for World {
@@ -183,6 +185,7 @@ impl World {
             pairs: Vec::new(),
             free_pairs: Vec::new(),
             pair_lists: EdgeLists::default(),
+            bearings: Vec::new(),
             pair_set: PairSet::new(),
             active_pairs: pairs::PlaceSet::default(),
             arbiters: ArbiterStore::new(tag),

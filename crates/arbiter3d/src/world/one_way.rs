@@ -13,7 +13,7 @@
 //!
 //! An arbiter that has begun is solid for its life. All is measured against the platform, so a moving one works alike.
 
-use super::pairs::{HITS, ONE_WAY, PASSING, PERSIST, PRE_SOLVE, Pair};
+use super::pairs::{BORNE, HITS, ONE_WAY, PASSING, PERSIST, PRE_SOLVE, Pair};
 use super::shapes::ShapeSlot;
 use crate::math::{Pose, Real, Rotation, Vec3};
 use crate::shape::Shape;
@@ -104,7 +104,10 @@ impl Pair {
     }
 }
 
-const _: () = assert!(PASSING | ONE_WAY | HITS | PERSIST | PRE_SOLVE == 31, "each trait has a bit of its own");
+const _: () = assert!(
+    BORNE[0] + BORNE[1] + PASSING + ONE_WAY + HITS + PERSIST + PRE_SOLVE == 127,
+    "each trait has a bit of its own"
+);
 
 #[cfg(test)]
 mod tests {

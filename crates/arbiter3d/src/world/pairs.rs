@@ -17,6 +17,7 @@ use crate::narrow_phase::PairCache;
 use crate::parallel::SharedSlice;
 use crate::shape::Shape;
 use crate::simd::{prefetch, quad_view};
+use crate::solver::BodyState;
 use crate::storage;
 use std::mem::MaybeUninit;
 
@@ -41,7 +42,7 @@ pub(crate) struct Pair {
     pub overlapping: bool,
     /// Whether `manifold_pose` holds: cleared by teleports and edits.
     pub has_manifold: bool,
-    /// What the shapes ask for beyond contacts: [`WATCHED`], [`ONE_WAY`], [`PASSING`].
+    /// What the shapes ask for beyond contacts: [`WATCHED`], [`ONE_WAY`], [`PASSING`]; and [`BORNE`].
     pub traits: u8,
     pub shapes: [u32; 2],
     /// Middle of the smaller shape when the manifold was made, from the centre of body 2 in the axes of body 1.
@@ -71,6 +72,8 @@ pub(crate) const HITS: u8 = 4;
 pub(crate) const ONE_WAY: u8 = 8;
 /// The shapes are passing through each other: no contact until they are out again.
 pub(crate) const PASSING: u8 = 16;
+/// Only one body of the two can be pushed: the first or the second. Never of a pair of a sensor.
+pub(crate) const BORNE: [u8; 2] = [32, 64];
 
 /// How many pairs ahead of its end what a pair touches is asked for.
 const PARTED_AHEAD: usize = 4;
@@ -136,6 +139,25 @@ impl Pair {
     #[inline(always)]
     pub fn closes_slowly(closing: Real, speculative_distance: Real) -> bool {
         closing < 2.0 * (0.25 * speculative_distance)
+    }
+
+    /// The body that can be pushed, if the other one cannot.
+    #[inline(always)]
+    pub fn borne(&self) -> Option<u32> {
+        match self.traits & (BORNE[0] | BORNE[1]) {
+            0 => None,
+            side => Some(self.bodies[usize::from(side != BORNE[0])]),
+        }
+    }
+
+    /// Notes which bodies can be pushed.
+    fn note_borne(&mut self, moves: [bool; 2]) {
+        let borne = match moves {
+            [true, false] if !self.sensor => BORNE[0],
+            [false, true] if !self.sensor => BORNE[1],
+            _ => 0,
+        };
+        self.traits = self.traits & !(BORNE[0] | BORNE[1]) | borne;
     }
 
     /// What two shapes ask for.
@@ -216,10 +238,24 @@ impl PairRules<'_> {
     }
 }
 
+/// What is told of a new pair.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Tie {
+    bodies: [u32; 2],
+    active: bool,
+    /// The body that alone can be pushed, or `NONE`.
+    borne: u32,
+}
+
+impl Tie {
+    const NONE: Self = Self { bodies: [0; 2], active: false, borne: NONE };
+}
+
 /// What a new pair is made of.
 struct PairMaker<'a> {
     shapes: &'a [ShapeSlot],
     bodies: &'a [Body],
+    states: &'a [BodyState],
     speculative_distance: Real,
 }
 
@@ -234,7 +270,7 @@ impl PairMaker<'_> {
             [a, b] => max(a, b), // a mesh has no inside
         };
         let cuboids = slots.iter().all(|shape| matches!(shape.geometry, Shape::Cuboid(_)));
-        Pair {
+        let mut pair = Pair {
             shapes,
             bodies,
             arbiter: NONE,
@@ -253,7 +289,9 @@ impl PairMaker<'_> {
             apart_rotation: self.speculative_distance / (8.0 * min(slots[0].reach, slots[1].reach)),
             cache: PairCache::default(),
             materials: [0; 2],
-        }
+        };
+        pair.note_borne(bodies.map(|body| self.states[body as usize].moves != 0));
+        pair
     }
 
     /// Asks for what the pair of two shapes is made of, their bodies once the shapes are there.
@@ -281,12 +319,13 @@ impl World {
         self.pair_set.reserve(found.len());
         let mut ties = std::mem::take(&mut self.tie_scratch);
         ties.clear();
-        ties.resize(found.len(), ([0; 2], false));
+        ties.resize(found.len(), Tie::NONE);
         let free = &self.free_pairs[..];
         let place_of = |nth: usize| if nth < reused { free[free.len() - 1 - nth] } else { (old + nth - reused) as u32 };
         let maker = PairMaker {
             shapes: &self.shapes,
             bodies: &self.bodies,
+            states: &self.solver_bodies.states,
             speculative_distance: self.scaled.speculative_distance,
         };
         // SAFETY: there is room for so many; what is not a pair yet is only written.
@@ -300,7 +339,8 @@ impl World {
                 let pair = maker.make(pair);
                 // SAFETY: each has a place of its own, and belongs to one block.
                 unsafe {
-                    *told.get_mut(nth) = (pair.bodies, pair.active);
+                    let borne = pair.borne().unwrap_or(NONE);
+                    *told.get_mut(nth) = Tie { bodies: pair.bodies, active: pair.active, borne };
                     places.get_mut(place_of(nth) as usize).write(pair);
                 }
             }
@@ -316,9 +356,13 @@ impl World {
         // SAFETY: old pairs keep their places, and each new place has been written.
         unsafe { self.pairs.set_len(count) };
         self.pair_lists.grow(count, self.bodies.len());
-        for (nth, &(bodies, active)) in ties.iter().enumerate() {
+        self.bearings.resize(self.bodies.len(), 0);
+        for (nth, &Tie { bodies, active, borne }) in ties.iter().enumerate() {
             let place = place_of(nth);
             self.pair_lists.link(place, bodies);
+            if borne != NONE {
+                self.bearings[borne as usize] += 1;
+            }
             if active {
                 self.active_pairs.insert(place);
             } else if self.pairs[place as usize].sensor {
@@ -355,6 +399,9 @@ impl World {
     fn drop_pair(&mut self, index: u32, reason: EndReason) {
         let pair = &self.pairs[index as usize];
         let (shapes, bodies, arbiter, overlapping) = (pair.shapes, pair.bodies, pair.arbiter, pair.overlapping);
+        if let Some(body) = pair.borne() {
+            self.bearings[body as usize] -= 1;
+        }
         if arbiter != NONE {
             self.end_arbiter(arbiter, reason);
         }
@@ -390,8 +437,23 @@ impl World {
             self.pairs_of_body(body).filter(|&pair| self.pairs[pair as usize].has_shape(slot)).collect();
         for index in pairs {
             let pair = &mut self.pairs[index as usize];
-            pair.traits = Pair::traits_of(pair.shapes.map(|slot| &self.shapes[slot as usize]));
+            let borne = pair.traits & (BORNE[0] | BORNE[1]);
+            pair.traits = Pair::traits_of(pair.shapes.map(|slot| &self.shapes[slot as usize])) | borne;
             pair.has_manifold = false;
+        }
+    }
+
+    /// Whether a body with pairs can be pushed has changed.
+    pub(crate) fn refresh_bearings(&mut self, body: u32) {
+        for index in self.pair_lists.of_body(body) {
+            let pair = &mut self.pairs[index as usize];
+            if let Some(body) = pair.borne() {
+                self.bearings[body as usize] -= 1;
+            }
+            pair.note_borne(pair.bodies.map(|body| self.solver_bodies.states[body as usize].moves != 0));
+            if let Some(body) = pair.borne() {
+                self.bearings[body as usize] += 1;
+            }
         }
     }
 

@@ -28,6 +28,8 @@ pub(crate) struct ShapeSlot {
     pub middle: Vec3,
     /// Distance of the farthest point of the shape from that middle.
     pub reach: Real,
+    /// How far it may creep before the broad phase hears of it, but for the limit: an eighth of the radius of its box.
+    pub creep: Real,
     pub sensor: bool,
     pub events: ContactEvents,
     /// Where the shape's frame sits on the body.
@@ -307,6 +309,7 @@ impl World {
             centered: false,
             middle: Vec3::ZERO,
             reach: definition.shape.reach_from(definition.shape.local_aabb().center()),
+            creep: 0.125 * definition.shape.local_aabb().half_extents().length(),
             geometry: definition.shape.clone(),
             density: definition.density,
             material: definition.material.normalized(),
@@ -394,9 +397,8 @@ impl World {
     pub(crate) fn fat_margin(&self, slot: u32) -> Real {
         let shape = &self.shapes[slot as usize];
         let settings = &self.scaled;
-        let radius = shape.geometry.local_aabb().half_extents().length();
         let still = self.bodies[shape.body as usize].kind == BodyKind::Static;
-        let creep = if still { 0.0 } else { crate::math::min(0.125 * radius, 2.5 * settings.speculative_distance) };
+        let creep = if still { 0.0 } else { crate::math::min(shape.creep, 2.5 * settings.speculative_distance) };
         settings.speculative_distance + creep
     }
 

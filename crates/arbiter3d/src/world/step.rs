@@ -585,7 +585,7 @@ impl FinalizeContext<'_> {
         body.sleep_time = if rests { body.sleep_time + self.dt } else { 0.0 };
         let traveled = state.translation.length() + state.turn.length() * (body.reach - body.inner_radius);
         if self.settings.continuous && traveled > self.least_way(body) {
-            self.note_fast(&FastBody { index, start }, body, (state, traveled), news);
+            self.note_fast(FastBody { index, start }, body, (state, traveled), news);
         }
         for &slot in &body.shape_slots {
             let shape = &self.shapes[slot as usize];
@@ -603,10 +603,10 @@ impl FinalizeContext<'_> {
     }
 
     /// Tells of a body that may have passed through something.
-    #[cold]
+    #[inline(always)]
     fn note_fast(
         &self,
-        fast: &FastBody,
+        fast: FastBody,
         body: &super::bodies::Body,
         (state, traveled): (&BodyState, Real),
         news: &mut BlockList<'_, BodyNews>,
@@ -614,20 +614,22 @@ impl FinalizeContext<'_> {
         let thickness = 0.5 * body.inner_radius;
         let swept = body.continuous && traveled > thickness;
         if body.bullet && swept {
-            news.push(BodyNews::Bullet(*fast));
+            news.push(BodyNews::Bullet(fast));
             return;
         }
         if self.any_bullets {
-            news.push(BodyNews::Moved(*fast));
+            news.push(BodyNews::Moved(fast));
         }
-        let center = fast.start.position + state.translation;
-        let passed = |other: &KinematicBody| other.may_be_passed(center, (traveled, body.reach, thickness));
-        if body.is_dynamic()
-            && swept
-            && (self.meets_static(body, center, state.translation) || self.kinematic.iter().any(passed))
-        {
-            news.push(BodyNews::Fast(*fast));
+        if body.is_dynamic() && swept && self.may_pass(body, fast.start.position, (state.translation, traveled)) {
+            news.push(BodyNews::Fast(fast));
         }
+    }
+
+    /// Whether a body, none of whose points has come farther than `traveled`, may have passed through something.
+    fn may_pass(&self, body: &super::bodies::Body, start: Vec3, (translation, traveled): (Vec3, Real)) -> bool {
+        let (center, own) = (start + translation, (traveled, body.reach, 0.5 * body.inner_radius));
+        self.kinematic.iter().any(|other| other.may_be_passed(center, own))
+            || self.meets_static(body, center, translation)
     }
 
     /// Whether a body may have met a static shape on its way.
@@ -645,13 +647,15 @@ impl FinalizeContext<'_> {
         let shape = &self.shapes[slot as usize];
         let tight = shape.geometry.aabb(&body.pose.mul(&shape.pose));
         let speculative = self.settings.speculative_distance;
-        let size = shape.geometry.inner_radius();
         let ahead = displacement.length();
-        let reach =
-            if ahead > speculative { displacement * (min(ahead, size + speculative) / ahead) } else { Vec3::ZERO };
+        let reach = if ahead > speculative {
+            displacement * (min(ahead, shape.geometry.inner_radius() + speculative) / ahead)
+        } else {
+            Vec3::ZERO
+        };
         let tight = tight.sweep(reach);
         let near = tight.expand(speculative);
-        let fat = || near.expand(min(0.125 * shape.geometry.local_aabb().half_extents().length(), 2.5 * speculative));
+        let fat = || near.expand(min(shape.creep, 2.5 * speculative));
         // SAFETY: a shape belongs to one body, which stands in the list of bodies once.
         if unsafe { self.boxes.update(slot, &near, fat) } {
             left.push(slot);

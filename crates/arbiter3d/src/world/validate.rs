@@ -61,6 +61,7 @@ impl World {
     }
 
     fn validate_pairs(&self) -> Result<(), String> {
+        let mut bearings = vec![0; self.bearings.len()];
         for (index, pair) in self.pairs.iter().enumerate().filter(|(_, pair)| pair.alive) {
             let awake = pair.bodies.iter().any(|&body| self.bodies[body as usize].awake);
             if awake != pair.active {
@@ -75,6 +76,15 @@ impl World {
                     return Err(format!("pair {index} and its arbiter {} do not know each other", pair.arbiter));
                 }
             }
+            let moves = pair.bodies.map(|body| self.solver_bodies.states[body as usize].moves != 0);
+            let borne = (!pair.sensor && moves[0] != moves[1]).then(|| pair.bodies[usize::from(moves[1])]);
+            if pair.borne() != borne {
+                return Err(format!("pair {index}: body {:?} should be {borne:?}, the one that moves", pair.borne()));
+            }
+            borne.into_iter().for_each(|body| bearings[body as usize] += 1);
+        }
+        if bearings != self.bearings {
+            return Err(format!("pairs with what nothing can push: {:?}, not {bearings:?}", self.bearings));
         }
         Ok(())
     }

@@ -466,14 +466,10 @@ impl CollideContext<'_> {
         pair.note_manifold(&fresh.between, self.solver.masses[pair.bodies[0] as usize].rotation, shapes);
     }
 
-    /// The body of a pair that can be pushed, if the other one cannot.
+    /// The body of a pair that lies on what nothing can push, if there are several such things by it.
     #[inline(always)]
     fn borne(&self, pair: &Pair) -> Option<u32> {
-        match pair.bodies.map(|body| self.solver.states[body as usize].moves != 0) {
-            [true, false] => Some(pair.bodies[0]),
-            [false, true] => Some(pair.bodies[1]),
-            _ => None,
-        }
+        pair.borne().filter(|&body| self.bearings[body as usize] > 1)
     }
 
     /// Whether a new manifold of a pair with a one-way platform counts; see [`one_way`].

@@ -48,7 +48,7 @@ enum News {
     Sensor(u32, bool),
     /// The arbiter has no contacts.
     Empty(u32),
-    /// The body has new contacts with what nothing can push.
+    /// The body, which has several pairs with what nothing can push, has new contacts of such a pair.
     Borne(u32),
     /// The shapes ask to be told something of their arbiter, and whether they have one.
     Watched(u32, bool),
@@ -76,6 +76,8 @@ struct CollideContext<'a> {
     filters: &'a UserFilters,
     /// Shapes whose proxies have moved since the last narrow phase.
     moved: &'a [bool],
+    /// By body: how many pairs it has with what nothing can push.
+    bearings: &'a [u32],
     dt: Real,
 }
 
@@ -162,6 +164,7 @@ impl World {
             level: self.level,
             filters: &self.filters,
             moved: &self.moved_shapes,
+            bearings: &self.bearings,
             dt,
         };
         let active = self.active_pairs.words();
@@ -183,6 +186,9 @@ impl World {
 
     /// Leaves contacts at seams between shapes that nothing can push out of the solve.
     fn hide_seams(&mut self, bodies: &mut Vec<u32>) {
+        if bodies.is_empty() {
+            return;
+        }
         bodies.sort_unstable();
         bodies.dedup();
         let search = SeamSearch {

@@ -185,8 +185,7 @@ impl SeamSearch<'_> {
             // SAFETY: nobody changes a pair between two moving bodies here, and others are this body's.
             let pair = unsafe { self.pairs.get(index as usize) };
             let side = usize::from(pair.bodies[0] == body);
-            let fixed = !pair.sensor && self.solver.states[pair.bodies[side] as usize].moves == 0;
-            fixed.then_some((index, pair, side))
+            (pair.borne() == Some(body)).then_some((index, pair, side))
         })
     }
 

@@ -218,6 +218,9 @@ impl ImpactSearch<'_> {
             if shape.sensor || !is_fast(shape, way, 0.0) {
                 continue;
             }
+            if kinematic.is_empty() && self.is_clear(shape, way) {
+                continue;
+            }
             for part in 0..way.parts {
                 let from = part as Real / way.parts as Real;
                 if from >= limit {
@@ -238,6 +241,36 @@ impl ImpactSearch<'_> {
             }
         }
         first
+    }
+
+    /// Whether nothing static is near the way of a shape but meshes, of which no triangle is: told by balls around the centre of
+    /// mass, long before the shape's own box is made.
+    ///
+    /// A shape turns about the middle of its core, which goes straight beside the centre of mass and at its distance from
+    /// that one; so no point comes farther from the way of the centre than the farthest is from it at first, and twice that
+    /// distance.
+    fn is_clear(&self, shape: &ShapeSlot, way: &Way) -> bool {
+        let pivot = match &shape.geometry {
+            Shape::Sphere(_) | Shape::Capsule(_) | Shape::Cuboid(_) => shape.from_center.position,
+            Shape::Hull(hull) => shape.from_center.transform_point(hull.centroid()),
+            _ => return false,
+        };
+        let reach = shape.middle.length() + shape.reach + 2.0 * pivot.length();
+        let path = Aabb::from_points([way.start.position, way.end.position]);
+        let around = path.expand(reach + self.settings.speculative_distance + 2.0 * self.settings.slop);
+        let mut clear = true;
+        self.broad_phase.query_static(&around, |slot| {
+            let other = &self.shapes[slot as usize];
+            let Shape::Mesh(mesh) = &other.geometry else {
+                clear = false;
+                return;
+            };
+            if clear {
+                let pose = self.bodies[other.body as usize].pose.mul(&other.pose);
+                mesh.for_each_facet(&around.transform(&pose.inverse()), |_| clear = false);
+            }
+        });
+        clear
     }
 
     /// Share of the path at which a shape first comes within a slop of a static one.
