@@ -243,12 +243,12 @@ impl ImpactSearch<'_> {
         first
     }
 
-    /// Whether nothing static is near the way of a shape but meshes, of which no triangle is: told by balls around the centre of
-    /// mass, long before the shape's own box is made.
+    /// Whether nothing static is near the way of a shape but meshes, of which no triangle is: told by balls around the
+    /// centre of mass, long before the shape's own box is made.
     ///
-    /// A shape turns about the middle of its core, which goes straight beside the centre of mass and at its distance from
-    /// that one; so no point comes farther from the way of the centre than the farthest is from it at first, and twice that
-    /// distance.
+    /// A shape turns about the middle of its core, which goes straight beside the centre of mass and at its distance
+    /// from that one; so no point comes farther from the way of the centre than the farthest is from it at first, and
+    /// twice that distance.
     fn is_clear(&self, shape: &ShapeSlot, way: &Way) -> bool {
         let pivot = match &shape.geometry {
             Shape::Sphere(_) | Shape::Capsule(_) | Shape::Cuboid(_) => shape.from_center.position,
