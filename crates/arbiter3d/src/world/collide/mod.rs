@@ -105,6 +105,9 @@ impl World {
         scratch.empty.clear();
         scratch.news.prepare(self.pool.threads(), PAIRS_PER_BLOCK);
         scratch.begins.prepare(self.pool.threads(), PAIRS_PER_BLOCK);
+        for list in [&mut scratch.borne, &mut scratch.empty, &mut scratch.apart] {
+            crate::storage::reserve(list, PAIRS_PER_BLOCK);
+        }
         scratch.blocks.clear();
         self.events.watched_pairs.clear();
         let blocks = self.active_pairs.words().chunks(WORDS_PER_BLOCK).enumerate();
