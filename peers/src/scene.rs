@@ -184,6 +184,7 @@ fn read_body(world: &World, id: BodyId) -> Body {
         awake: body.kind() != BodyKind::Dynamic || body.is_awake(),
         enabled: body.is_enabled(),
         continuous: body.is_continuous(),
+        bullet: body.is_bullet(),
         user_data: 0,
     };
     let shapes = body.shapes().iter().filter_map(|&shape| world.shape(shape)).map(|shape| ShapeDefinition {
@@ -193,6 +194,9 @@ fn read_body(world: &World, id: BodyId) -> Body {
         density: shape.density(),
         material: shape.material(),
         filter: shape.filter(),
+        palette: shape.palette().to_vec(),
+        one_way: shape.one_way(),
+        events: shape.events(),
         sensor: shape.is_sensor(),
         user_data: 0,
     });

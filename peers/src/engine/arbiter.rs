@@ -108,6 +108,24 @@ impl Copies {
     }
 }
 
+impl Ask for Arbiter {
+    fn ray(&self, origin: Vec3, way: Vec3) -> Option<Real> {
+        self.world.cast_ray(origin, way, 1.0, &QueryFilter::default()).ok()?.map(|hit| hit.fraction)
+    }
+
+    fn ball(&self, origin: Vec3, way: Vec3) -> Option<Real> {
+        let start = Pose::from_position(origin);
+        let cast = ShapeCast::along(&self.probes[0], start, way);
+        self.world.cast_shape(&cast, &QueryFilter::default()).ok()?.map(|hit| hit.fraction)
+    }
+
+    fn cuboid(&self, origin: Vec3, way: Vec3) -> Option<Real> {
+        let start = Pose::new(origin, Rotation::from_quat(tilt()));
+        let cast = ShapeCast::along(&self.probes[1], start, way);
+        self.world.cast_shape(&cast, &QueryFilter::default()).ok()?.map(|hit| hit.fraction)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -157,23 +175,5 @@ mod tests {
             assert!((a - b).length() < 1e-4, "step {step}: {a} and {b}");
             assert!(step < 20 || a.z < -1.0, "step {step}: {a} has hardly moved");
         });
-    }
-}
-
-impl Ask for Arbiter {
-    fn ray(&self, origin: Vec3, way: Vec3) -> Option<Real> {
-        self.world.cast_ray(origin, way, 1.0, &QueryFilter::default()).ok()?.map(|hit| hit.fraction)
-    }
-
-    fn ball(&self, origin: Vec3, way: Vec3) -> Option<Real> {
-        let start = Pose::from_position(origin);
-        let cast = ShapeCast::along(&self.probes[0], start, way);
-        self.world.cast_shape(&cast, &QueryFilter::default()).ok()?.map(|hit| hit.fraction)
-    }
-
-    fn cuboid(&self, origin: Vec3, way: Vec3) -> Option<Real> {
-        let start = Pose::new(origin, Rotation::from_quat(tilt()));
-        let cast = ShapeCast::along(&self.probes[1], start, way);
-        self.world.cast_shape(&cast, &QueryFilter::default()).ok()?.map(|hit| hit.fraction)
     }
 }
