@@ -12,13 +12,16 @@
 //! witness points come from the weights of the simplex. Only the cores are compared: where they overlap, [`closest`]
 //! gives `None` and the caller turns to the separating axes.
 
+use super::cores::Core;
 use super::support::Support;
 use crate::math::{Pose, Real, Vec3};
 use glam::{DMat3, DVec3};
 
 mod linear_cast;
+mod newton;
 
 pub(crate) use linear_cast::{Cast, CastPoint, linear_cast};
+pub(super) use newton::{Settled, tangents};
 
 /// Cores closer than this share of their size overlap: beyond it the direction is rounding.
 const TOUCHING: f64 = 1e-9;
@@ -27,8 +30,12 @@ const TOUCHING: f64 = 1e-9;
 const FLAT: f64 = 1e-10;
 /// The search ends when a new extreme point gains less than this share of the distance.
 const GAIN: f64 = 1e-12;
-/// Round cores come closer by ever less: the direction is good to a hundred thousandth then.
-const ROUND_GAIN: f64 = 1e-10;
+/// Round cores come closer by ever less (unless Newton's method works): the direction is good to three hundred thousandths then.
+const ROUND_GAIN: f64 = 1e-9;
+/// With the shapes moved, as it is done once more from there.
+const LIFTED_GAIN: f64 = 1e-8;
+/// The rounds before which round cores are tried with Newton's method, from the direction reached.
+const TRIES: [usize; 4] = [3, 6, 10, 20];
 /// Polyhedra of 255 corners need less than 20 rounds; the cap is for rounding that goes in circles.
 const MAX_ROUNDS: usize = 64;
 
@@ -54,15 +61,18 @@ pub(super) struct Corner {
 
 /// Up to four corners and the weights that make the point closest to the origin.
 #[derive(Default)]
-struct Simplex {
+pub(super) struct Simplex {
     corners: [Corner; 4],
     weights: [f64; 4],
     count: usize,
+    /// The last direction looked against.
+    direction: DVec3,
 }
 
 /// Closest points of two cores, `pose` placing shape 2 in the frame of shape 1; `None` where the cores overlap.
 pub(crate) fn closest(shape1: &Support, shape2: &Support, pose: &Pose) -> Option<Closest> {
-    let Nearness::Gap(Gap { point1, way }) = search(&Placed::new(shape1, shape2, pose), f64::INFINITY) else {
+    let placed = Placed::new(shape1, shape2, pose);
+    let Nearness::Gap(Gap { point1, way }) = placed.nearness(f64::INFINITY) else {
         return None;
     };
     let distance = way.length();
@@ -92,22 +102,37 @@ pub(super) enum Nearness {
     Overlap,
 }
 
-/// The search for [`closest`], given up once a direction shows a gap beyond `limit`.
-fn search(placed: &Placed<'_>, limit: f64) -> Nearness {
-    let gain = if placed.is_round() { ROUND_GAIN } else { GAIN };
-    let mut simplex = Simplex::default();
-    let mut v = placed.position;
-    if v.length_squared() == 0.0 {
-        v = DVec3::X;
-    }
+/// The search for [`closest`], given up once a direction shows a gap beyond `limit`; `start` points from shape 1 to shape 2 and
+/// is not zero; `shift` is added to the position of shape 2. The simplex is left as it was last.
+fn search(placed: &Placed<'_>, limit: f64, (start, shift): (DVec3, DVec3), simplex: &mut Simplex) -> Nearness {
+    let gain = if !placed.round {
+        GAIN
+    } else if shift == DVec3::ZERO {
+        ROUND_GAIN
+    } else {
+        LIFTED_GAIN
+    };
+    let mut v = start;
     let mut point1 = DVec3::ZERO;
     let mut size = 0.0;
     let mut shortest = f64::MAX;
     // Whether some direction has shown a gap: without one, a search that ends by rounding ends inside.
     let mut apart = false;
-    for _ in 0..MAX_ROUNDS {
-        let corner = placed.corner(-v);
+    simplex.count = 0;
+    for round in 0..MAX_ROUNDS {
+        if placed.round && apart && TRIES.contains(&round) {
+            match placed.settle(v.normalize(), shift, limit, |aside, height| aside <= gain * height * height) {
+                Settled::Beyond => return Nearness::Beyond,
+                Settled::At { corner, normal, height, .. } if height < 0.0 => {
+                    return Nearness::Gap(Gap { point1: corner.point1, way: normal * -height });
+                }
+                _ => {}
+            }
+        }
+        let mut corner = placed.corner(-v);
+        corner.difference += shift;
         let w = corner.difference;
+        simplex.direction = v;
         size = larger(size, w.length_squared());
         let squared = v.length_squared();
         let along = v.dot(w);
@@ -117,31 +142,28 @@ fn search(placed: &Placed<'_>, limit: f64) -> Nearness {
                 return Nearness::Beyond;
             }
         }
-        let repeated = simplex.corners[..simplex.count].iter().any(|c| c.difference == w);
-        if simplex.count > 0 && (repeated || squared - along <= gain * squared) {
+        if simplex.count > 0 && (squared - along <= gain * squared || simplex.has(w)) {
             break;
         }
         simplex.push(corner);
-        let Some(mut feature) = simplex.nearest_feature() else {
+        let Some(mut feature) = simplex.nearest_feature(true) else {
             if along > 0.0 {
                 break; // All corners are on one side of the origin: a tetrahedron that holds it is flat, and rounding.
             }
             return Nearness::Overlap;
         };
-        if simplex.squared(&feature) >= shortest {
+        if feature.squared >= shortest {
             // Of corners that almost coincide the regions are rounding: the nearest of all faces, edges and corners is not.
             feature = simplex.nearest_of_all();
         }
-        if simplex.squared(&feature) >= shortest {
+        if feature.squared >= shortest {
             break;
         }
         simplex.keep(&feature);
-        let nearer = simplex.point();
-        let squared = nearer.length_squared();
-        if squared <= TOUCHING * TOUCHING * size {
+        if feature.squared <= TOUCHING * TOUCHING * size {
             return Nearness::Overlap;
         }
-        (v, point1, shortest) = (nearer, simplex.witness(), squared);
+        (v, point1, shortest) = (feature.point, simplex.witness(), feature.squared);
     }
     if apart { Nearness::Gap(Gap { point1, way: v }) } else { Nearness::Overlap }
 }
@@ -157,33 +179,45 @@ fn larger(a: f64, b: f64) -> f64 {
 
 /// Two shapes and the placement of the second one.
 pub(super) struct Placed<'a> {
-    shape1: &'a Support<'a>,
-    shape2: &'a Support<'a>,
+    shapes: [&'a Support<'a>; 2],
+    cores: [Core<'a>; 2],
     rotation: DMat3,
     position: DVec3,
+    round: bool,
 }
 
 impl<'a> Placed<'a> {
     pub(super) fn new(shape1: &'a Support<'a>, shape2: &'a Support<'a>, pose: &Pose) -> Self {
         let m = pose.rotation.to_mat3();
         let rotation = DMat3::from_cols(m.x_axis.as_dvec3(), m.y_axis.as_dvec3(), m.z_axis.as_dvec3());
-        Self { shape1, shape2, rotation, position: pose.position.as_dvec3() }
-    }
-
-    /// The same pair with shape 2 moved.
-    pub(super) fn moved(&self, by: DVec3) -> Self {
-        Self { position: self.position + by, ..*self }
+        Self {
+            shapes: [shape1, shape2],
+            cores: [Core::new(shape1), Core::new(shape2)],
+            rotation,
+            position: pose.position.as_dvec3(),
+            round: shape1.has_round_core() || shape2.has_round_core(),
+        }
     }
 
     /// Whether one of the shapes has a round core, so that no few corners make their difference.
     pub(super) fn is_round(&self) -> bool {
-        self.shape1.has_round_core() || self.shape2.has_round_core()
+        self.round
+    }
+
+    pub(super) fn cores(&self) -> &[Core<'a>; 2] {
+        &self.cores
     }
 
     /// The smaller of the shapes' sizes.
     pub(super) fn size(&self) -> f64 {
-        let (a, b) = (self.shape1.size(), self.shape2.size());
+        let [a, b] = self.shapes.map(Support::size);
         f64::from(if a < b { a } else { b })
+    }
+
+    /// Whether shape 2 is the smaller one.
+    pub(super) fn is_second_smaller(&self) -> bool {
+        let [a, b] = self.shapes.map(Support::size);
+        b < a
     }
 
     /// Where shape 2 is.
@@ -193,12 +227,24 @@ impl<'a> Placed<'a> {
 
     /// The closest points, unless the cores are apart by more than `limit` (zero or more) or overlap.
     pub(super) fn nearness(&self, limit: f64) -> Nearness {
-        search(self, limit)
+        self.nearness_by(limit, &mut Simplex::default())
+    }
+
+    /// As [`Placed::nearness`]; where the cores overlap, `simplex` tells which corners show it.
+    pub(super) fn nearness_by(&self, limit: f64, simplex: &mut Simplex) -> Nearness {
+        let start = if self.position.length_squared() == 0.0 { DVec3::X } else { self.position };
+        search(self, limit, (start, DVec3::ZERO), simplex)
+    }
+
+    /// The closest points with shape 2 moved by `way`, if that is enough for a gap.
+    pub(super) fn gap_after(&self, way: DVec3) -> Option<Gap> {
+        let nearness = search(self, f64::INFINITY, (way, way), &mut Simplex::default());
+        if let Nearness::Gap(gap) = nearness { Some(gap) } else { None }
     }
 
     /// How far the surfaces are from the cores.
     pub(super) fn radii(&self) -> [f64; 2] {
-        [self.shape1.radius().into(), self.shape2.radius().into()]
+        self.shapes.map(|shape| shape.radius().into())
     }
 
     /// Puts a point of shape 2 into the frame of shape 1.
@@ -207,73 +253,106 @@ impl<'a> Placed<'a> {
         m.x_axis * point.x + m.y_axis * point.y + m.z_axis * point.z + self.position
     }
 
+    /// Turns a direction of shape 2 into the frame of shape 1.
+    pub(super) fn turn(&self, direction: DVec3) -> DVec3 {
+        let m = &self.rotation;
+        m.x_axis * direction.x + m.y_axis * direction.y + m.z_axis * direction.z
+    }
+
+    /// Turns a direction of the frame of shape 1 into that of shape 2.
+    #[inline]
+    pub(super) fn turn_back(&self, direction: DVec3) -> DVec3 {
+        let m = &self.rotation;
+        DVec3::new(m.x_axis.dot(direction), m.y_axis.dot(direction), m.z_axis.dot(direction))
+    }
+
     /// The extreme point of the difference along `direction`.
     pub(super) fn corner(&self, direction: DVec3) -> Corner {
-        let point1 = self.shape1.core_support(-direction);
-        let m = &self.rotation;
-        let local = DVec3::new(m.x_axis.dot(direction), m.y_axis.dot(direction), m.z_axis.dot(direction));
-        let point2 = self.place(self.shape2.core_support(local));
+        let point1 = self.cores[0].support(-direction);
+        let point2 = self.place(self.cores[1].support(self.turn_back(direction)));
         Corner { difference: point2 - point1, point1 }
     }
 }
 
 impl Simplex {
+    /// Its corners.
+    pub(super) fn corners(&self) -> &[Corner] {
+        &self.corners[..self.count]
+    }
+
+    /// The last direction, from shape 1 to shape 2, along which a corner was looked for; of any length.
+    pub(super) fn direction(&self) -> DVec3 {
+        self.direction
+    }
+
     fn push(&mut self, corner: Corner) {
         self.corners[self.count] = corner;
         self.count += 1;
     }
 
+    fn has(&self, difference: DVec3) -> bool {
+        self.corners().iter().any(|c| c.difference == difference)
+    }
+
     /// The point that the weights make.
     fn point(&self) -> DVec3 {
-        (0..self.count).fold(DVec3::ZERO, |sum, k| sum + self.corners[k].difference * self.weights[k])
+        let mut sum = DVec3::ZERO;
+        for k in 0..self.count {
+            sum += self.corners[k].difference * self.weights[k];
+        }
+        sum
     }
 
     /// The point of shape 1 that the weights make.
     fn witness(&self) -> DVec3 {
-        (0..self.count).fold(DVec3::ZERO, |sum, k| sum + self.corners[k].point1 * self.weights[k])
+        let mut sum = DVec3::ZERO;
+        for k in 0..self.count {
+            sum += self.corners[k].point1 * self.weights[k];
+        }
+        sum
     }
 
-    /// The face, edge or corner closest to the origin; `None` if it is inside.
-    fn nearest_feature(&self) -> Option<Feature> {
-        let p = self.corners.map(|c| c.difference);
+    #[inline(always)]
+    fn differences<const N: usize>(&self, at: [usize; N]) -> [DVec3; N] {
+        at.map(|k| self.corners[k].difference)
+    }
+
+    /// The face, edge or corner closest to the origin; `None` if it is inside. `settled` as for [`closest_on_tetrahedron`].
+    #[inline(always)]
+    fn nearest_feature(&self, settled: bool) -> Option<Feature> {
         match self.count {
-            1 => Some(([0, 0, 0], [1.0, 0.0, 0.0], 1)),
-            2 => Some(closest_on_segment(&p, [0, 1])),
-            3 => Some(closest_on_triangle(&p, [0, 1, 2])),
-            _ => closest_on_tetrahedron(&p),
+            1 => Some(Feature::corner(0, self.corners[0].difference)),
+            2 => Some(closest_on_segment(self.differences([0, 1]), [0, 1])),
+            3 => Some(closest_on_triangle(self.differences([0, 1, 2]), [0, 1, 2])),
+            _ => closest_on_tetrahedron(&self.differences([0, 1, 2, 3]), settled),
         }
     }
 
     /// As [`Simplex::nearest_feature`] for an origin outside, by trying all of them: slower, but no rounding makes it farther
     /// than any of them.
+    #[cold]
     fn nearest_of_all(&self) -> Feature {
-        let p = self.corners.map(|c| c.difference);
-        let mut best = ([0, 0, 0], [1.0, 0.0, 0.0], 1);
+        let mut best = Feature::corner(0, self.corners[0].difference);
         let mut offer = |feature: Feature| {
-            if combine(&p, &feature).length_squared() < combine(&p, &best).length_squared() {
+            if feature.squared < best.squared {
                 best = feature;
             }
         };
         for a in 0..self.count {
-            offer(([a, 0, 0], [1.0, 0.0, 0.0], 1));
+            offer(Feature::corner(a, self.corners[a].difference));
             for b in a + 1..self.count {
-                offer(closest_on_segment(&p, [a, b]));
+                offer(closest_on_segment(self.differences([a, b]), [a, b]));
                 for c in b + 1..self.count {
-                    offer(closest_on_triangle(&p, [a, b, c]));
+                    offer(closest_on_triangle(self.differences([a, b, c]), [a, b, c]));
                 }
             }
         }
         best
     }
 
-    /// Square of the distance of a feature's point.
-    fn squared(&self, feature: &Feature) -> f64 {
-        combine(&self.corners.map(|c| c.difference), feature).length_squared()
-    }
-
     /// Keeps the corners of the feature closest to the origin; false if that is inside.
     fn reduce(&mut self) -> bool {
-        let feature = self.nearest_feature();
+        let feature = self.nearest_feature(false);
         if let Some(feature) = &feature {
             self.keep(feature);
         }
@@ -281,84 +360,111 @@ impl Simplex {
     }
 
     /// Drops the corners that are not part of a feature and takes over its weights.
-    fn keep(&mut self, &(indices, weights, count): &Feature) {
+    #[inline(always)]
+    fn keep(&mut self, feature: &Feature) {
         let corners = self.corners;
-        for k in 0..count {
-            self.corners[k] = corners[indices[k]];
-            self.weights[k] = weights[k];
+        for k in 0..3 {
+            self.corners[k] = corners[feature.at[k] & 3];
+            self.weights[k] = feature.weights[k];
         }
-        self.count = count;
+        self.count = feature.count;
     }
 }
 
-/// Which corners, their weights, how many.
-type Feature = ([usize; 3], [f64; 3], usize);
+/// A corner, an edge or a face of a simplex with its point closest to the origin.
+#[derive(Clone, Copy)]
+struct Feature {
+    /// Which corners; past the count anything.
+    at: [usize; 3],
+    weights: [f64; 3],
+    count: usize,
+    point: DVec3,
+    /// Square of the point's distance.
+    squared: f64,
+}
 
-fn closest_on_segment(p: &[DVec3; 4], [a, b]: [usize; 2]) -> Feature {
-    let ab = p[b] - p[a];
-    let along = -p[a].dot(ab);
-    let squared = ab.length_squared();
+impl Feature {
+    #[inline(always)]
+    fn new(at: [usize; 3], weights: [f64; 3], count: usize, point: DVec3) -> Self {
+        Self { at, weights, count, point, squared: point.length_squared() }
+    }
+
+    #[inline(always)]
+    fn corner(at: usize, point: DVec3) -> Self {
+        Self::new([at; 3], [1.0, 0.0, 0.0], 1, point)
+    }
+}
+
+#[inline(always)]
+fn closest_on_segment([p, q]: [DVec3; 2], [a, b]: [usize; 2]) -> Feature {
+    let way = q - p;
+    let along = -p.dot(way);
+    let squared = way.length_squared();
     if along <= 0.0 {
-        ([a, 0, 0], [1.0, 0.0, 0.0], 1)
+        Feature::corner(a, p)
     } else if along >= squared {
-        ([b, 0, 0], [1.0, 0.0, 0.0], 1)
+        Feature::corner(b, q)
     } else {
         let t = along / squared;
-        ([a, b, 0], [1.0 - t, t, 0.0], 2)
+        Feature::new([a, b, b], [1.0 - t, t, 0.0], 2, p * (1.0 - t) + q * t)
     }
 }
 
 /// The weights of the origin's projection are the areas of the triangles that it makes with the sides. Where one is not
-/// positive the closest point is on a side: the closest of the three, which needs no case for each region.
-fn closest_on_triangle(p: &[DVec3; 4], [a, b, c]: [usize; 3]) -> Feature {
-    let n = (p[b] - p[a]).cross(p[c] - p[a]);
-    let u = p[b].cross(p[c]).dot(n);
-    let v = p[c].cross(p[a]).dot(n);
-    let w = p[a].cross(p[b]).dot(n);
+/// positive the closest point is on that side, or on the closest of those.
+#[inline]
+fn closest_on_triangle([p, q, r]: [DVec3; 3], [a, b, c]: [usize; 3]) -> Feature {
+    let n = (q - p).cross(r - p);
+    let u = q.cross(r).dot(n);
+    let v = r.cross(p).dot(n);
+    let w = p.cross(q).dot(n);
     let sum = u + v + w;
     if u > 0.0 && v > 0.0 && w > 0.0 && sum > 0.0 {
-        return ([a, b, c], [u / sum, v / sum, w / sum], 3);
+        let weights = [u / sum, v / sum, w / sum];
+        return Feature::new([a, b, c], weights, 3, p * weights[0] + q * weights[1] + r * weights[2]);
     }
-    nearest(p, [[a, b], [b, c], [c, a]].map(|side| closest_on_segment(p, side)))
+    let mut best = Feature { squared: f64::INFINITY, ..Feature::corner(a, p) };
+    let mut offer = |feature: Feature| {
+        if feature.squared < best.squared {
+            best = feature;
+        }
+    };
+    if w <= 0.0 {
+        offer(closest_on_segment([p, q], [a, b]));
+    }
+    if u <= 0.0 {
+        offer(closest_on_segment([q, r], [b, c]));
+    }
+    if v <= 0.0 {
+        offer(closest_on_segment([r, p], [c, a]));
+    }
+    if best.squared == f64::INFINITY {
+        // All areas are above zero, but not their sum: no number is.
+        best.squared = p.length_squared();
+    }
+    best
 }
 
-/// `None` if the origin is inside.
-fn closest_on_tetrahedron(p: &[DVec3; 4]) -> Option<Feature> {
-    let faces = [[0, 1, 2, 3], [0, 1, 3, 2], [0, 2, 3, 1], [1, 2, 3, 0]];
-    let mut best = None;
-    let mut shortest = f64::MAX;
-    for [a, b, c, opposite] in faces {
+/// `None` if the origin is inside. If the last corner was looked for from the face of the others, the origin is on the same
+/// side of that face: it is `settled`.
+#[inline(always)]
+fn closest_on_tetrahedron(p: &[DVec3; 4], settled: bool) -> Option<Feature> {
+    let mut best: Option<Feature> = None;
+    let faces = [[0, 1, 3, 2], [0, 2, 3, 1], [1, 2, 3, 0], [0, 1, 2, 3]];
+    for [a, b, c, opposite] in faces.into_iter().take(if settled { 3 } else { 4 }) {
         let n = (p[b] - p[a]).cross(p[c] - p[a]);
         let (up, inside) = (p[opposite] - p[a], n.dot(p[opposite] - p[a]));
         let origin = -n.dot(p[a]);
         // The origin is beyond this face, or the tetrahedron is flat (then the sign is rounding) and all its faces count.
         let is_flat = inside * inside <= FLAT * FLAT * n.length_squared() * up.length_squared();
         if is_flat || (inside > 0.0) != (origin > 0.0) {
-            let feature = closest_on_triangle(p, [a, b, c]);
-            let squared = combine(p, &feature).length_squared();
-            if squared < shortest {
-                (best, shortest) = (Some(feature), squared);
+            let feature = closest_on_triangle([p[a], p[b], p[c]], [a, b, c]);
+            if best.is_none_or(|best| feature.squared < best.squared) {
+                best = Some(feature);
             }
         }
     }
     best
-}
-
-/// The feature nearest to the origin; the first of equal ones.
-fn nearest<const N: usize>(p: &[DVec3; 4], features: [Feature; N]) -> Feature {
-    let mut best = features[0];
-    let mut shortest = combine(p, &best).length_squared();
-    for feature in features.into_iter().skip(1) {
-        let squared = combine(p, &feature).length_squared();
-        if squared < shortest {
-            (best, shortest) = (feature, squared);
-        }
-    }
-    best
-}
-
-fn combine(p: &[DVec3; 4], (indices, weights, count): &Feature) -> DVec3 {
-    (0..*count).fold(DVec3::ZERO, |sum, k| sum + p[indices[k]] * weights[k])
 }
 
 #[cfg(test)]

@@ -12,8 +12,8 @@
 //! Features are placed in `f64` and looked at from the touching point, so that a pebble on a hall keeps its height.
 
 use super::clip::{ClipPoint, choose_four, clip_polygon};
-use super::distance::{Gap, Nearness, Placed};
-use super::penetration::penetration;
+use super::distance::Placed;
+use super::nearest::{Nearest, nearest};
 use super::support::Support;
 use super::{Manifold, ManifoldPoint};
 use crate::math::{Pose, Real, Vec3, clamp, max, min, tangents};
@@ -61,17 +61,7 @@ impl Touch {
         let [radius1, radius2] = placed.radii();
         // A hair beyond what rounding may make of the separation.
         let limit = (radius1 + radius2 + f64::from(margin)) * (1.0 + 1e-6);
-        let (point1, normal, distance) = match placed.nearness(limit) {
-            Nearness::Beyond => return None,
-            Nearness::Gap(Gap { point1, way }) => {
-                let distance = way.length();
-                (point1, way / distance, distance)
-            }
-            Nearness::Overlap => {
-                let found = penetration(placed);
-                (found.point1, found.normal, -found.depth)
-            }
-        };
+        let Nearest { point1, normal, distance } = nearest(placed, limit)?;
         let separation = (distance - radius1 - radius2) as Real;
         let point1 = point1 + normal * radius1;
         (separation <= margin).then_some(Self { point1, normal: normal.as_vec3(), separation })

@@ -16,6 +16,7 @@
 mod capsule;
 mod clip;
 mod composite;
+mod cores;
 mod cuboid;
 mod distance;
 mod general;
@@ -24,6 +25,7 @@ mod hull;
 mod manifold;
 mod mesh;
 mod mesh_points;
+mod nearest;
 mod penetration;
 mod polyhedron;
 mod revolved;
@@ -37,6 +39,7 @@ mod triangle_general;
 mod triangle_lanes;
 mod triangle_solid;
 
+pub(crate) use cores::Ellipsoid;
 pub(crate) use cuboid::{CuboidLanes, CuboidPair, Near as NearCuboids, WideManifold};
 pub(crate) use distance::{Cast, CastPoint, closest, linear_cast};
 pub(crate) use seam::{Cast as SeamCast, Patch, scale_of};
@@ -169,6 +172,8 @@ fn mirror(pose: &Pose, manifold: &mut Manifold) {
     manifold.set_materials([b, a]);
 }
 
+#[cfg(test)]
+mod nearest_tests;
 #[cfg(test)]
 mod oracle_tests;
 #[cfg(test)]

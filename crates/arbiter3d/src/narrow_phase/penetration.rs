@@ -1,40 +1,66 @@
-//! How deep two convex cores overlap, and along which normal: the expanding polytope algorithm.
+//! How deep two convex cores overlap, and along which normal.
 //!
-//! The cores overlap where the origin is inside the set of differences `x1 − x2`; the least motion that parts them leads
-//! from the origin to the nearest point of its boundary. A polytope inside the set grows: the face nearest to the origin
-//! is replaced by those to the set's farthest point along its normal, until that is no farther than the face. Source: van
-//! den Bergen, "Proximity Queries and Penetration Depth Computation on 3D Game Objects", 2001.
+//! The cores overlap where the origin is inside the set of differences `x1 − x2`. Its height along a unit vector `n`, the largest
+//! `n · (x1 − x2)`, is how far shape 2 has to move along `n` to part from shape 1; the least of all heights is the depth.
 //!
-//! Unlike there, the first tetrahedron need not hold the origin: a face that the origin is in front of has a negative
-//! distance and so comes first. The depth told is that along the normal found, which is never less than the least one, and
-//! more by no more than [`GAIN`]. Round sets would need many corners for that: they are searched less finely, and the way out
-//! is then polished with closest points.
+//! Of polyhedra it is found by the expanding polytope: one inside the set grows, the face nearest to the origin being replaced
+//! by those to the set's farthest point along its normal, until that is no farther than the face. Source: van den Bergen,
+//! "Proximity Queries and Penetration Depth Computation on 3D Game Objects", 2001. Unlike there, the first tetrahedron need not
+//! hold the origin: a face that the origin is in front of has a negative distance and so comes first.
+//!
+//! Round sets would need many corners for that. They are searched the other way round:
+//!
+//! 1. The lowest of some heights: along the line of centres, the faces that look at each other, the last direction in which the
+//!    closest points were looked for.
+//! 2. Moved just apart along that direction, the closest points give a better one, which is never higher and soon the lowest
+//!    around: the normal of a round surface turns by less than the position that it is looked at from (`polished`).
+//! 3. That no other way out is shorter, far from it, is proved. A point that is `a` deep in core 1 and `b` deep in core 2 (balls
+//!    of these radii around it fit in) shows that the set of differences holds a ball of radius `a + b` about the origin, so
+//!    that nothing is lower. Where the deepest points show that, nothing is left to do (`is_proved`).
+//! 4. Else the polytope grows until all of its faces are as far as the height found, but for a tolerance. A face that is not and
+//!    whose own height is lower begins anew at 2.
 //!
 //! All in `f64`, as in `distance`.
 
-use super::distance::{Gap, Nearness, Placed};
+use super::cores::smaller;
+use super::distance::{Gap, Placed, Settled, Simplex, tangents};
 use glam::DVec3;
 
 /// A face is on the boundary if the set reaches past it by less than this share of the size.
 const GAIN: f64 = 1e-7;
-/// Of round sets: by less than this share of the smaller shape's size, because the rest is polished.
+/// Of round sets no way out is shorter than the one found by more than this share of the smaller shape's size,
 const ROUND_GAIN: f64 = 1e-5;
-/// And this share of the depth.
+/// and this share of the depth,
 const ROUND_SHARE: f64 = 5e-6;
-/// But no less than this share of the set's size.
+/// but no less than this share of the set's size.
 const ROUNDING: f64 = 1e-9;
 /// What is thinner than this share of its size is flat.
 const FLAT: f64 = 1e-9;
+/// Around the way out the set is known from directions that lean by this tangent: as far as its smooth part stays within the
+/// tolerance of the triangle between them.
+const RING_LEAN: f64 = 4e-3;
+const RING: [(f64, f64); 3] = [(1.0, 0.0), (-0.5, 0.866_025_403_784), (-0.5, -0.866_025_403_784)];
+/// A tetrahedron to begin with has at least six times this share of the cube of its shortest edge as its volume.
+const THICK: f64 = 1e-3;
 /// A triangle is a sliver if twice its area is less than this share of the square of its longest edge.
 const SLIVER: f64 = 1e-10;
-/// A polyhedron of `n` corners has `2n − 4` faces.
+/// Corners that most pairs get by with, and at most. A polyhedron of `n` corners has `2n − 4` faces.
+const FEW_CORNERS: usize = 20;
+const FEW_FACES: usize = 2 * FEW_CORNERS - 4;
 const MAX_CORNERS: usize = 96;
 const MAX_FACES: usize = 2 * MAX_CORNERS - 4;
 const MAX_HORIZON: usize = 64;
 /// How far beyond touching the shapes are moved apart to see the way out better, as a share of the smaller size.
-const LIFT: f64 = 1e-2;
-/// Times that is done.
-const POLISHINGS: usize = 3;
+const LIFT: f64 = 5e-2;
+/// Times that is done at most,
+const POLISHINGS: usize = 4;
+/// and as long as it gains this share of the smaller size.
+const POLISH_GAIN: f64 = 1e-6;
+
+/// Points that ought to touch are opposite each other within this share of the smaller size.
+const ASIDE: f64 = 1e-3;
+/// Unit vectors whose dot product is less than one by no more than this tell the same way.
+const SAME_WAY: f64 = 1e-6;
 
 /// Where two overlapping cores are to be parted, in the frame of shape 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,84 +88,228 @@ struct Face {
     offset: f64,
 }
 
-/// A growing polytope.
-struct Polytope {
-    corners: [Corner; MAX_CORNERS],
+/// A growing polytope with room for some corners and faces.
+struct Polytope<const C: usize, const F: usize> {
+    corners: [Corner; C],
     corner_count: usize,
-    faces: [Face; MAX_FACES],
+    faces: [Face; F],
     face_count: usize,
 }
 
-/// Overlap of two cores that are not apart.
-pub(super) fn penetration(placed: &Placed<'_>) -> Penetration {
-    let found = least_way_out(placed).unwrap_or_else(|| along(placed, placed.position().normalize_or(DVec3::Y)));
-    if placed.is_round() { polished(placed, found) } else { found }
+/// A way out with the points of both cores that touch at last.
+#[derive(Clone, Copy)]
+struct Way {
+    found: Penetration,
+    /// A point of core 2 deep in core 1, `depth` behind `point1` but for what is left to polish.
+    point2: DVec3,
+    /// The farthest point of core 1 along the normal, and that of core 2 against it.
+    touching: [DVec3; 2],
 }
 
-/// The expanding polytope; `None` if all of it is slivers.
-fn least_way_out(placed: &Placed<'_>) -> Option<Penetration> {
-    // `Placed` gives differences `x2 − x1`.
+/// Overlap of two cores that are not apart, as the search with `simplex` has told.
+pub(super) fn penetration(placed: &Placed<'_>, simplex: &Simplex) -> Penetration {
+    if placed.is_round() {
+        return round_penetration(placed, simplex);
+    }
+    let few = grow::<FEW_CORNERS, FEW_FACES>(placed, simplex, None);
+    few.or_else(|| grow::<MAX_CORNERS, MAX_FACES>(placed, simplex, None))
+        .map_or_else(|| along(placed, toward(placed)).found, |way| way.found)
+}
+
+fn round_penetration(placed: &Placed<'_>, simplex: &Simplex) -> Penetration {
+    let size = placed.size();
+    let way = polished(placed, shallowest(placed, simplex), size);
+    let tolerance = ROUND_GAIN * size + ROUND_SHARE * way.found.depth;
+    if is_proved(placed, &way, tolerance) {
+        return way.opposite(placed, size);
+    }
+    let goal = Goal { way, size, tolerance };
+    let few = grow::<FEW_CORNERS, FEW_FACES>(placed, simplex, Some(&goal));
+    few.or_else(|| grow::<MAX_CORNERS, MAX_FACES>(placed, simplex, Some(&goal))).unwrap_or(way).opposite(placed, size)
+}
+
+impl Way {
+    /// What was found. Where the closest points did not help (the support of a large shape in single precision is too coarse for
+    /// a small one beside it), farthest points of both cores can lie far aside from each other: the smaller shape's counts.
+    fn opposite(self, placed: &Placed<'_>, size: f64) -> Penetration {
+        let Penetration { point1, normal, depth } = self.found;
+        let other = self.point2 + normal * depth;
+        let aside = (point1 - other).length_squared() > ASIDE * ASIDE * size * size;
+        Penetration { point1: if aside && placed.is_second_smaller() { other } else { point1 }, ..self.found }
+    }
+}
+
+/// The way out that has to be proved the shortest.
+struct Goal {
+    way: Way,
+    size: f64,
+    tolerance: f64,
+}
+
+/// From one centre to the other.
+fn toward(placed: &Placed<'_>) -> DVec3 {
+    let [core1, core2] = placed.cores();
+    (placed.place(core2.middle()) - core1.middle()).normalize_or(DVec3::Y)
+}
+
+/// The expanding polytope; `None` if there is no room for all that it needs. Of polyhedra it finds the least way out, of round
+/// cores it proves that none is shorter than the goal, or finds one.
+fn grow<const C: usize, const F: usize>(placed: &Placed<'_>, simplex: &Simplex, goal: Option<&Goal>) -> Option<Way> {
     let corner = |direction: DVec3| {
         let corner = placed.corner(-direction);
         Corner { difference: -corner.difference, point1: corner.point1 }
     };
-    let first = match first_corners(&corner) {
+    let first = match tetrahedron(simplex).map_or_else(|| first_corners(&corner), Ok) {
         Ok(first) => first,
-        Err((normal, on_plane)) => return Some(flat_penetration(normal, on_plane)),
+        Err((normal, on_plane)) => {
+            let found = flat_penetration(normal, on_plane);
+            return Some(Way { found, ..along(placed, found.normal) });
+        }
     };
-    let mut polytope = Polytope::new(first);
     let size = first.iter().fold(0.0, |size: f64, c| larger(c.difference.length_squared(), size)).sqrt();
-    let round_gain = if placed.is_round() { ROUND_GAIN * placed.size() } else { 0.0 };
+    let rounding = ROUNDING * size;
+    let mut polytope = Polytope::<C, F>::new(first);
+    if let Some(goal) = goal {
+        let normal = goal.way.found.normal;
+        let [t1, t2] = tangents(normal);
+        for (along1, along2) in RING {
+            let direction = normal + (t1 * along1 + t2 * along2) * RING_LEAN;
+            polytope.take_in(corner(direction.normalize()), rounding);
+        }
+    }
     // The least depth seen, for a search that has to be given up.
-    let mut best = along(placed, placed.position().normalize_or(DVec3::Y));
+    let mut best = goal.map_or_else(|| along(placed, toward(placed)), |goal| goal.way);
+    let gain = goal.map_or(GAIN * size, |goal| larger(0.5 * goal.tolerance, rounding));
     loop {
         let nearest = polytope.nearest_face()?;
         let face = polytope.faces[nearest];
+        if goal.is_some_and(|goal| face.offset >= best.found.depth - larger(goal.tolerance, rounding)) {
+            return Some(best);
+        }
         let reached = corner(face.normal);
         let height = reached.difference.dot(face.normal);
-        let gain = if round_gain > 0.0 {
-            larger(round_gain + ROUND_SHARE * height.abs(), ROUNDING * size)
-        } else {
-            GAIN * size
-        };
-        if height - face.offset <= gain {
-            return Some(polytope.result(&face, height));
+        match goal {
+            Some(goal) if height < best.found.depth - gain => {
+                let lower = polished(placed, along(placed, face.normal), goal.size);
+                if lower.found.depth < best.found.depth {
+                    best = lower;
+                }
+                if best.found.depth - gain <= face.offset {
+                    return Some(best);
+                }
+            }
+            Some(_) => {}
+            None if height - face.offset <= gain => {
+                let found = polytope.result(&face, height);
+                return Some(Way { found, ..best });
+            }
+            None if height < best.found.depth => best = along(placed, face.normal),
+            None => {}
         }
-        if height < best.depth {
-            best = Penetration { point1: reached.point1, normal: face.normal, depth: height };
+        if height - face.offset <= rounding {
+            // Nothing is beyond this face, and all others are farther.
+            return Some(best);
         }
         if !polytope.expand(nearest, reached) {
-            return Some(best);
+            return if C == MAX_CORNERS { Some(best) } else { None };
         }
     }
 }
 
 /// How far the cores overlap along a unit direction.
-fn along(placed: &Placed<'_>, normal: DVec3) -> Penetration {
+fn along(placed: &Placed<'_>, normal: DVec3) -> Way {
     let corner = placed.corner(-normal);
-    Penetration { point1: corner.point1, normal, depth: -corner.difference.dot(normal) }
+    let (point1, point2) = (corner.point1, corner.point1 + corner.difference);
+    let found = Penetration { point1, normal, depth: -corner.difference.dot(normal) };
+    Way { found, point2, touching: [point1, point2] }
+}
+
+/// The least overlap along some directions.
+fn shallowest(placed: &Placed<'_>, simplex: &Simplex) -> Way {
+    let [core1, core2] = placed.cores();
+    let [middle1, middle2] = [core1.middle(), placed.place(core2.middle())];
+    let mut best = along(placed, (middle2 - middle1).normalize_or(DVec3::Y));
+    let mut offer = |direction: DVec3| {
+        let way = along(placed, direction);
+        if way.found.depth < best.found.depth {
+            best = way;
+        }
+    };
+    if let Some(last) = simplex.direction().try_normalize() {
+        offer(last);
+    }
+    if let Some((normal, _)) = core1.face_towards(middle2) {
+        offer(normal);
+    }
+    if let Some((normal, _)) = core2.face_towards(placed.turn_back(middle1 - placed.position())) {
+        offer(-placed.turn(normal));
+    }
+    best
 }
 
 /// The same way out, seen from a little farther: with the shapes moved just apart along the normal found, the closest points
 /// tell the true one the better the shallower the overlap is, because the normal of a round surface turns by less than the
 /// position that it is looked at from.
-fn polished(placed: &Placed<'_>, found: Penetration) -> Penetration {
-    let (mut best, lift) = (found, LIFT * placed.size());
+fn polished(placed: &Placed<'_>, from: Way, size: f64) -> Way {
+    let (mut best, lift) = (from, LIFT * size);
+    let aligned = POLISH_GAIN * size;
+    let settled = placed.settle(from.found.normal, DVec3::ZERO, f64::INFINITY, |aside, _| aside <= aligned * aligned);
+    if let Settled::At { corner, normal, height, .. } = settled
+        && height <= from.found.depth
+    {
+        let (point1, point2) = (corner.point1, corner.point1 + corner.difference);
+        return Way { found: Penetration { point1, normal, depth: height }, point2, touching: [point1, point2] };
+    }
     for _ in 0..POLISHINGS {
-        let moved = placed.moved(best.normal * (best.depth + lift));
-        let Nearness::Gap(Gap { point1, way }) = moved.nearness(f64::INFINITY) else { break };
-        let normal = way / way.length();
-        let next = Penetration { point1, ..along(placed, normal) };
-        if next.depth >= best.depth {
+        let Penetration { normal, depth, .. } = best.found;
+        let shift = normal * (depth + lift);
+        let Some(Gap { point1, way }) = placed.gap_after(shift) else { break };
+        let mut next = along(placed, way / way.length());
+        (next.found.point1, next.point2) = (point1, point1 + way - shift);
+        let gained = depth - next.found.depth;
+        if gained >= 0.0 {
+            best = next;
+        } else if next.found.normal.dot(normal) > 1.0 - SAME_WAY {
+            // The same but for rounding: of a line or a face, any corner was the deepest point so far.
+            (best.found.point1, best.point2) = (next.found.point1, next.point2);
+        }
+        if gained <= POLISH_GAIN * size {
             break;
         }
-        best = next;
     }
     best
 }
 
+/// Whether the points that touch show that no way out is shorter: a point `a` deep in core 1 and `b` deep in core 2 is the
+/// middle of a ball of radius `a + b` in the set of differences.
+fn is_proved(placed: &Placed<'_>, way: &Way, tolerance: f64) -> bool {
+    let [core1, core2] = placed.cores();
+    let Penetration { point1, normal, depth } = way.found;
+    let inner1 = |point: DVec3| core1.inner_depth(point, way.touching[0], normal);
+    let local = |point: DVec3| placed.turn_back(point - placed.position());
+    let (touching2, back) = (local(way.touching[1]), placed.turn_back(-normal));
+    let inner2 = |point: DVec3| core2.inner_depth(local(point), touching2, back);
+    let wanted = depth - tolerance;
+    if inner1(way.point2) >= wanted || inner2(point1) >= wanted {
+        return true;
+    }
+    let middle = (point1 + way.point2) * 0.5;
+    let (a, b) = (inner1(middle), inner2(middle));
+    a >= 0.0 && b >= 0.0 && a + b >= wanted
+}
+
 fn larger(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
+}
+
+/// The corners of a search that ended in a tetrahedron around the origin, if it is not flat.
+fn tetrahedron(simplex: &Simplex) -> Option<[Corner; 4]> {
+    let corners: &[_; 4] = simplex.corners().try_into().ok()?;
+    let first = corners.map(|c| Corner { difference: -c.difference, point1: c.point1 });
+    let [a, b, c] = [1, 2, 3].map(|k| first[k].difference - first[0].difference);
+    let normal = a.cross(b);
+    let longest = smaller(smaller(a.length_squared(), b.length_squared()), c.length_squared());
+    (normal.dot(c).abs() > THICK * longest * longest.sqrt()).then_some(first)
 }
 
 /// Four corners of the set that span a volume; else the normal of the plane that it lies in, and a corner.
@@ -190,12 +360,11 @@ fn flat_penetration(normal: DVec3, on_plane: Corner) -> Penetration {
     Penetration { point1: on_plane.point1, normal, depth: -height.abs() }
 }
 
-impl Polytope {
+impl<const C: usize, const F: usize> Polytope<C, F> {
     fn new(first: [Corner; 4]) -> Self {
         let none = Corner { difference: DVec3::ZERO, point1: DVec3::ZERO };
         let dead = Face { corners: [0; 3], normal: DVec3::ZERO, offset: 0.0 };
-        let mut polytope =
-            Self { corners: [none; MAX_CORNERS], corner_count: 4, faces: [dead; MAX_FACES], face_count: 0 };
+        let mut polytope = Self { corners: [none; C], corner_count: 4, faces: [dead; F], face_count: 0 };
         polytope.corners[..4].copy_from_slice(&first);
         let [a, b, c, d] = first.map(|c| c.difference);
         let outward = (b - a).cross(c - a).dot(d - a) < 0.0;
@@ -232,17 +401,31 @@ impl Polytope {
         best
     }
 
+    /// Takes in a corner if it is outside by more than rounding.
+    fn take_in(&mut self, corner: Corner, rounding: f64) {
+        let (mut seeing, mut farthest) = (None, rounding);
+        for (index, face) in self.faces[..self.face_count].iter().enumerate() {
+            let above = face.normal.dot(corner.difference) - face.offset;
+            if above > farthest {
+                (seeing, farthest) = (Some(index), above);
+            }
+        }
+        if let Some(seeing) = seeing {
+            self.expand(seeing, corner);
+        }
+    }
+
     /// Takes in a corner that a face sees; false if there is no room for it.
     ///
     /// What goes is the connected patch of faces that see the corner: among flat faces rounding would have others see it
     /// too, here and there.
     fn expand(&mut self, seen: usize, corner: Corner) -> bool {
         let mut outline = Outline { edges: [[0; 2]; MAX_HORIZON], count: 0 };
-        if self.corner_count == MAX_CORNERS || !outline.cross(self.faces[seen].corners) {
+        if self.corner_count == C || !outline.cross(self.faces[seen].corners) {
             return false;
         }
         // Those that see the corner, the patch first.
-        let mut patch = [seen as u16; MAX_FACES];
+        let mut patch = [seen as u16; F];
         let mut seeing = 1;
         for (index, face) in self.faces[..self.face_count].iter().enumerate() {
             let sliver = face.offset == f64::MAX;
@@ -268,7 +451,7 @@ impl Polytope {
                 k += 1;
             }
         }
-        if self.face_count - patch_count + outline.count > MAX_FACES {
+        if self.face_count - patch_count + outline.count > F {
             return false;
         }
         // The last face takes the place of each that goes, from the back so that none of those moves.
@@ -338,14 +521,18 @@ impl Outline {
 mod tests {
     use super::*;
     use crate::math::{Pose, Rotation, Vec3};
+    use crate::narrow_phase::distance::Nearness;
     use crate::narrow_phase::support::Support;
     use crate::narrow_phase::tests::Random;
     use crate::shape::{Cuboid, Cylinder, Shape};
 
     fn depth(a: &Support<'_>, b: &Support<'_>, pose: &Pose) -> Option<Penetration> {
         let pairs = [Placed::new(a, b, pose), Placed::new(b, a, &pose.inverse())];
-        let [found, swapped] =
-            pairs.map(|pair| matches!(pair.nearness(f64::INFINITY), Nearness::Overlap).then(|| penetration(&pair)));
+        let [found, swapped] = pairs.map(|pair| {
+            let mut simplex = Simplex::default();
+            let overlap = matches!(pair.nearness_by(f64::INFINITY, &mut simplex), Nearness::Overlap);
+            overlap.then(|| penetration(&pair, &simplex))
+        });
         assert_eq!(found.is_some(), swapped.is_some());
         if let (Some(x), Some(y)) = (found, swapped) {
             assert!((x.depth - y.depth).abs() < 1e-5, "{x:?} {y:?}");

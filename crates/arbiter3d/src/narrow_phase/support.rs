@@ -277,7 +277,7 @@ fn polyhedron_feature(solid: &Polyhedron<'_>, d: Vec3, out: &mut Feature) {
 }
 
 /// The first of the points that are furthest along `direction`.
-fn furthest(points: &[Vec3], direction: DVec3) -> DVec3 {
+pub(super) fn furthest(points: &[Vec3], direction: DVec3) -> DVec3 {
     let (mut best, mut most) = (DVec3::ZERO, f64::MIN);
     for point in points {
         let point = point.as_dvec3();

@@ -8,7 +8,7 @@ use super::geometry::Geometry;
 use super::mass::Moments;
 use super::{MassProperties, Shape, ShapeError};
 use crate::math::{Aabb, Mat3, Pose, Real, Vec3, max, max3, min3};
-use crate::narrow_phase::Support;
+use crate::narrow_phase::{Ellipsoid, Support};
 use crate::query::{Ray, ShapeHit, cast_ray};
 use glam::{DMat3, DVec3};
 
@@ -29,6 +29,8 @@ pub struct Transformed {
     inverse: Mat3,
     unit_mass: MassProperties,
     inner_radius: Real,
+    /// Where the shape is a sphere.
+    ellipsoid: Option<Ellipsoid>,
 }
 
 impl Transformed {
@@ -49,7 +51,16 @@ impl Transformed {
         let flat = ShapeError::FlatTransform { determinant: linear.determinant() };
         let unit_mass = mapped.unit_mass().ok_or(flat)?;
         let inner_radius = shape.inner_ball().1 / norm_bound(inverse);
-        Ok(Self { shape: shape.clone(), linear, translation, inverse, unit_mass, inner_radius })
+        let ellipsoid = if let Shape::Sphere(ball) = shape {
+            // A ball rolls inside whose radius is the square of the shortest half axis over the longest one.
+            let longest = f64::from(norm_bound(linear) * ball.radius());
+            let rolling = f64::from(inner_radius) * f64::from(inner_radius) / longest;
+            let linear = double(linear) * f64::from(ball.radius());
+            Some(Ellipsoid { linear, center: translation.as_dvec3(), rolling })
+        } else {
+            None
+        };
+        Ok(Self { shape: shape.clone(), linear, translation, inverse, unit_mass, inner_radius, ellipsoid })
     }
 
     /// The shape before the map.
@@ -68,6 +79,11 @@ impl Transformed {
     #[must_use]
     pub fn translation(&self) -> Vec3 {
         self.translation
+    }
+
+    /// What the searches need of an ellipsoid, if it is one.
+    pub(crate) fn ellipsoid(&self) -> Option<Ellipsoid> {
+        self.ellipsoid
     }
 
     pub(crate) fn support(&self, d: DVec3) -> DVec3 {
