@@ -22,14 +22,14 @@ use common::*;
 const GOLDEN: [(&str, u64); 10] = [
     ("pile", 0x7e9c_c0ad_5a70_2769),
     ("hulls", 0x7d4f_1a72_0999_6ad2),
-    ("mesh rain", 0xb2c8_6c48_1dec_e272),
-    ("bullets", 0x9f41_d97b_8d7d_9482),
+    ("mesh rain", 0x1b5e_0c9b_a984_9a39),
+    ("bullets", 0x8856_6650_05ad_3a01),
     ("custom contacts", 0x770f_f93e_d37a_7820),
-    ("coming and going", 0x175a_6cdf_bc22_934d),
-    ("surfaces", 0x6ebd_7724_4afd_b709),
-    ("rods and bullets", 0x09fd_da73_6a9a_6e4e),
-    ("compounds and voxels", 0xe396_1b42_375d_65a9),
-    ("mixed convex", 0xc564_7343_7f93_017d),
+    ("coming and going", 0xad49_17e9_d9a3_c27f),
+    ("surfaces", 0xaae4_be7b_5bb6_52fe),
+    ("rods and bullets", 0x337e_1f6d_0c1b_0294),
+    ("compounds and voxels", 0x38cb_4758_4a96_6801),
+    ("mixed convex", 0x1bc1_9e5e_e510_3213),
 ];
 
 /// A scene: how it begins, and what is done before each step.

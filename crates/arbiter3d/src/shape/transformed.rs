@@ -5,12 +5,14 @@
 
 use super::convex::Feature;
 use super::geometry::Geometry;
+use super::inside::Inside;
 use super::mass::Moments;
 use super::{MassProperties, Shape, ShapeError};
 use crate::math::{Aabb, Mat3, Pose, Real, Vec3, max, max3, min3};
 use crate::narrow_phase::Support;
 use crate::query::{Ray, ShapeHit, cast_ray};
 use glam::{DMat3, DVec3};
+use std::sync::OnceLock;
 
 /// A convex shape after an affine map.
 ///
@@ -29,6 +31,8 @@ pub struct Transformed {
     inverse: Mat3,
     unit_mass: MassProperties,
     inner_radius: Real,
+    /// Once it is asked for.
+    inside: OnceLock<Option<Inside>>,
 }
 
 impl Transformed {
@@ -49,7 +53,15 @@ impl Transformed {
         let flat = ShapeError::FlatTransform { determinant: linear.determinant() };
         let unit_mass = mapped.unit_mass().ok_or(flat)?;
         let inner_radius = shape.inner_ball().1 / norm_bound(inverse);
-        Ok(Self { shape: shape.clone(), linear, translation, inverse, unit_mass, inner_radius })
+        Ok(Self {
+            shape: shape.clone(),
+            linear,
+            translation,
+            inverse,
+            unit_mass,
+            inner_radius,
+            inside: OnceLock::new(),
+        })
     }
 
     /// The shape before the map.
@@ -68,6 +80,12 @@ impl Transformed {
     #[must_use]
     pub fn translation(&self) -> Vec3 {
         self.translation
+    }
+
+    /// What continuous collision sweeps of it.
+    pub(crate) fn inside(&self) -> Option<&Inside> {
+        let map = |point: DVec3| double(self.linear) * point + self.translation.as_dvec3();
+        self.inside.get_or_init(|| Inside::of_support(&Support::new(&self.shape)?, map)).as_ref()
     }
 
     pub(crate) fn support(&self, d: DVec3) -> DVec3 {
