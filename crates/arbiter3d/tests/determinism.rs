@@ -22,8 +22,8 @@ use common::*;
 const GOLDEN: [(&str, u64); 10] = [
     ("pile", 0x7e9c_c0ad_5a70_2769),
     ("hulls", 0x7d4f_1a72_0999_6ad2),
-    ("mesh rain", 0xb2c8_6c48_1dec_e272),
-    ("bullets", 0x9f41_d97b_8d7d_9482),
+    ("mesh rain", 0x1b5e_0c9b_a984_9a39),
+    ("bullets", 0x8856_6650_05ad_3a01),
     ("custom contacts", 0x770f_f93e_d37a_7820),
     ("coming and going", 0x175a_6cdf_bc22_934d),
     ("surfaces", 0x6ebd_7724_4afd_b709),

@@ -29,11 +29,10 @@ pub(crate) enum Support<'a> {
     Custom(&'a Custom),
     /// The hull of some points.
     Points(&'a [Vec3]),
-    /// A smaller copy of a convex shape about a point inside.
-    Scaled {
-        shape: &'a Shape,
-        center: Vec3,
-        factor: Real,
+    /// A rounded shape with a smaller rounding.
+    Slim {
+        rounded: &'a Rounded,
+        radius: Real,
     },
 }
 
@@ -66,7 +65,7 @@ impl<'a> Support<'a> {
             Self::Capsule(s) => s.radius(),
             Self::TaperedCapsule(s) => s.core_radius(),
             Self::Rounded(s) => s.radius() + Self::new(s.core()).map_or(0.0, |core| core.radius()),
-            Self::Scaled { shape, factor, .. } => Self::new(shape).map_or(0.0, |whole| whole.radius() * factor),
+            Self::Slim { rounded, radius } => radius + Self::new(rounded.core()).map_or(0.0, |core| core.radius()),
             _ => 0.0,
         }
     }
@@ -80,7 +79,9 @@ impl<'a> Support<'a> {
             | Self::Hull(_)
             | Self::Triangle(_)
             | Self::Cloud(_) => false,
-            Self::Rounded(s) => Self::new(s.core()).is_some_and(|core| core.has_round_core()),
+            Self::Rounded(s) | Self::Slim { rounded: s, .. } => {
+                Self::new(s.core()).is_some_and(|core| core.has_round_core())
+            }
             _ => true,
         }
     }
@@ -102,15 +103,12 @@ impl<'a> Support<'a> {
             Self::Cone(s) => s.support(direction),
             Self::TaperedCapsule(s) => s.core_support(direction),
             Self::Cloud(s) => furthest(s.points(), direction),
-            Self::Rounded(s) => Self::new(s.core()).map_or(DVec3::ZERO, |core| core.core_support(direction)),
+            Self::Rounded(s) | Self::Slim { rounded: s, .. } => {
+                Self::new(s.core()).map_or(DVec3::ZERO, |core| core.core_support(direction))
+            }
             Self::Transformed(s) => s.support(direction),
             Self::Custom(s) => s.support(direction),
             Self::Points(points) => furthest(points, direction),
-            Self::Scaled { shape, center, factor } => {
-                let (center, factor) = (center.as_dvec3(), f64::from(*factor));
-                let whole = Self::new(shape).map_or(center, |whole| whole.core_support(direction));
-                center + (whole - center) * factor
-            }
         }
     }
 
@@ -128,7 +126,7 @@ impl<'a> Support<'a> {
             Self::Capsule(s) => s,
             Self::Cuboid(s) => s,
             Self::Hull(s) => *s,
-            Self::Triangle(_) | Self::Points(_) | Self::Scaled { .. } => return None,
+            Self::Triangle(_) | Self::Points(_) | Self::Slim { .. } => return None,
             Self::Cylinder(s) => s,
             Self::Cone(s) => s,
             Self::TaperedCapsule(s) => s,
@@ -148,10 +146,7 @@ impl<'a> Support<'a> {
             Self::Hull(s) => s.local_aabb().transform(pose),
             Self::Triangle(corners) => Aabb::from_points(corners.map(|corner| pose.transform_point(corner))),
             Self::Points(points) => Aabb::from_points(points.iter().map(|point| pose.transform_point(*point))),
-            Self::Scaled { shape, center, factor } => {
-                let (whole, center) = (shape.aabb(pose), pose.transform_point(*center));
-                Aabb::new(center + (whole.min - center) * *factor, center + (whole.max - center) * *factor)
-            }
+            Self::Slim { rounded, radius } => rounded.core().aabb(pose).expand(*radius),
             other => other.geometry().map_or(Aabb::EMPTY, |shape| shape.aabb(pose)),
         }
     }
@@ -184,9 +179,7 @@ impl<'a> Support<'a> {
             Self::Hull(s) => return longest(s.vertices()),
             Self::Triangle(corners) => return longest(corners),
             Self::Points(points) => return longest(points),
-            Self::Scaled { shape, center, factor } => {
-                return shape.reach_from(*center) * factor + (*center - pivot).length();
-            }
+            Self::Slim { rounded, radius } => return rounded.core().reach_from(pivot) + radius,
             other => return other.geometry().map_or(0.0, |shape| shape.reach_from(pivot)),
         };
         around_origin + pivot.length()
@@ -220,7 +213,10 @@ impl<'a> Support<'a> {
     pub(crate) fn inner_ball(&self) -> (Vec3, Real) {
         match self {
             Self::Triangle([a, b, c]) => ((*a + *b + *c) * (1.0 / 3.0), 0.0),
-            Self::Scaled { shape, center, factor } => (*center, shape.inner_ball().1 * factor),
+            Self::Slim { rounded, radius } => {
+                let (center, inner) = rounded.core().inner_ball();
+                (center, inner + radius)
+            }
             other => other.geometry().map_or((Vec3::ZERO, 0.0), |shape| shape.inner_ball()),
         }
     }
@@ -253,7 +249,7 @@ impl<'a> Support<'a> {
             Self::Rounded(s) => s.feature(d, out),
             Self::Transformed(s) => s.feature(d, out),
             Self::Custom(s) => s.feature(d, out),
-            Self::Points(_) | Self::Scaled { .. } => out.push(self.full_support(d.as_dvec3()).as_vec3()),
+            Self::Points(_) | Self::Slim { .. } => out.push(self.full_support(d.as_dvec3()).as_vec3()),
         }
     }
 }

@@ -101,6 +101,15 @@ impl<'a> Motion<'a> {
     }
 }
 
+/// When and how two moving shapes come to touch.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Touch {
+    /// Share of the motion.
+    pub time: Real,
+    /// Unit vector from shape 1 to shape 2, world.
+    pub normal: Vec3,
+}
+
 /// The first time in `[0, 1]` at which the gap of two moving shapes falls to `target` (metres, about a tenth more
 /// counts), or `None` if it never does.
 ///
@@ -108,33 +117,35 @@ impl<'a> Motion<'a> {
 /// that start apart but within `target` are stopped where half of that first gap is left, so that one that slides
 /// along another is not held. After [`MAX_ROUNDS`] rounds (fast spin close to a surface) the time reached is given
 /// back: nothing is ever missed, a stop may be early.
-pub(crate) fn time_of_impact(
+pub(crate) fn first_touch(
     shape1: &Support,
     sweep1: &Sweep,
     shape2: &Support,
     sweep2: &Sweep,
     target: Real,
-) -> Option<Real> {
+) -> Option<Touch> {
     let motion = Motion::new(sweep1, sweep2);
     let radii = shape1.radius() + shape2.radius();
     let (spin1, spin2) = (sweep1.swing_of(shape1), sweep2.swing_of(shape2));
     let rounding = 1e-6 * max(shape1.reach(sweep1.pivot), shape2.reach(sweep2.pivot));
     let mut target = target;
-    let mut t: Real = 0.0;
+    let mut touch = Touch { time: 0.0, normal: Vec3::ZERO };
     for round in 0..MAX_ROUNDS {
+        let t = touch.time;
         let (pose1, relative) = motion.at(t);
         let found = closest(shape1, shape2, &relative);
         let gap = found.map_or(-1.0, |c| c.distance - radii);
         let Some(found) = found.filter(|_| gap > 0.0) else {
             // Past the start this is rounding: the gap was there a moment ago.
-            return if round == 0 { None } else { Some(t) };
+            return if round == 0 { None } else { Some(touch) };
         };
+        let normal = pose1.rotation.rotate(found.normal);
+        touch.normal = normal;
         if round == 0 {
             target = min(0.5 * gap, target);
         } else if gap <= target + max(TOLERANCE * target, rounding) {
-            return Some(t);
+            return Some(touch);
         }
-        let normal = pose1.rotation.rotate(found.normal);
         let closing = -(motion.displacement.dot(normal.as_dvec3())) as Real;
         let speed = closing + spin1.cross(normal).length() + spin2.cross(normal).length();
         if speed <= 0.0 {
@@ -145,11 +156,22 @@ pub(crate) fn time_of_impact(
             return None;
         }
         if next <= t {
-            return Some(t);
+            return Some(touch);
         }
-        t = next;
+        touch.time = next;
     }
-    Some(t)
+    Some(touch)
+}
+
+/// The time of [`first_touch`].
+pub(crate) fn time_of_impact(
+    shape1: &Support,
+    sweep1: &Sweep,
+    shape2: &Support,
+    sweep2: &Sweep,
+    target: Real,
+) -> Option<Real> {
+    first_touch(shape1, sweep1, shape2, sweep2, target).map(|touch| touch.time)
 }
 
 /// Gap of two shapes, `pose` placing shape 2 in the frame of shape 1; zero or less where they overlap.

@@ -2,12 +2,14 @@
 
 use super::convex::{Feature, mass_of_support, sampled_feature, sphere_grid};
 use super::geometry::Geometry;
+use super::inside::Inside;
 use super::{MassProperties, ShapeError};
 use crate::math::{Aabb, Pose, Real, Vec3, max, min};
 use crate::narrow_phase::Support;
 use crate::query::{Ray, ShapeHit, cast_support};
 use glam::DVec3;
 use std::fmt::Debug;
+use std::sync::OnceLock;
 
 /// A convex shape of your own. The support function and a centre are enough: box, mass, rays and contacts follow from them.
 /// What you know better, override.
@@ -87,6 +89,8 @@ pub struct Custom {
     center: Vec3,
     inner_radius: Real,
     reach: Real,
+    /// Once it is asked for.
+    inside: OnceLock<Option<Inside>>,
 }
 
 /// Steps of the grid of directions in which a shape is tried.
@@ -117,7 +121,7 @@ impl Custom {
             return Err(ShapeError::BadBox { min: aabb.min, max: aabb.max });
         }
         let inner_radius = INNER_SHARE * max(inner, 0.0);
-        let mut custom = Self { shape, aabb, unit_mass: None, center, inner_radius, reach };
+        let mut custom = Self { shape, aabb, unit_mass: None, center, inner_radius, reach, inside: OnceLock::new() };
         custom.unit_mass = custom.shape.unit_mass().or_else(|| mass_of_support(&Support::Custom(&custom)).ok());
         Ok(custom)
     }
@@ -126,6 +130,11 @@ impl Custom {
     #[must_use]
     pub fn shape(&self) -> &dyn ConvexShape {
         &*self.shape
+    }
+
+    /// What continuous collision sweeps of it.
+    pub(crate) fn inside(&self) -> Option<&Inside> {
+        self.inside.get_or_init(|| Inside::of_support(&Support::Custom(self), |point| point)).as_ref()
     }
 
     #[inline]

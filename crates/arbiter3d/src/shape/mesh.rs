@@ -5,6 +5,7 @@
 //! reported to the user is a position in the user's list.
 
 use super::geometry::Geometry;
+use super::mesh_core::InnerShell;
 use super::mesh_edges::{Adjacency, Surface, Surroundings};
 use super::mesh_interior::Interior;
 use super::mesh_tree::{Descent, LEAF, Leaves, MeshTree};
@@ -90,6 +91,8 @@ pub struct TriangleMesh {
     open_edges: usize,
     /// Of a closed mesh, once it is asked for.
     interior: OnceLock<Interior>,
+    /// The same.
+    shell: OnceLock<InnerShell>,
 }
 
 impl TriangleMesh {
@@ -173,6 +176,7 @@ impl TriangleMesh {
             materials: Vec::new(),
             open_edges,
             interior: OnceLock::new(),
+            shell: OnceLock::new(),
         }
     }
 
@@ -224,6 +228,12 @@ impl TriangleMesh {
     /// What is known of the inside of a closed mesh.
     fn interior(&self) -> Option<&Interior> {
         (self.open_edges == 0).then(|| self.interior.get_or_init(|| Interior::of(self)))
+    }
+
+    /// What continuous collision sweeps of a closed mesh that is not inside out.
+    pub(crate) fn inner_shell(&self) -> Option<&InnerShell> {
+        let solid = self.interior().is_some_and(|interior| interior.ball.1 > 0.0);
+        solid.then(|| self.shell.get_or_init(|| InnerShell::of(self)))
     }
 
     /// Which sides are solid.

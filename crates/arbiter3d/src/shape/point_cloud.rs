@@ -7,6 +7,7 @@
 
 use super::convex::{FEATURE_POINTS, Feature, sampled_feature, sphere_grid};
 use super::geometry::Geometry;
+use super::inside::Inside;
 use super::{ConvexHull, MassProperties, ShapeError};
 use crate::math::{Aabb, Pose, Real, Vec3, max, tangents};
 use crate::narrow_phase::Support;
@@ -28,6 +29,8 @@ pub struct PointCloud {
     aabb: Aabb,
     unit_mass: Option<MassProperties>,
     inner: (Vec3, Real),
+    /// What continuous collision sweeps of it; `None` of a flat one.
+    inside: Option<Inside>,
 }
 
 impl PointCloud {
@@ -45,8 +48,9 @@ impl PointCloud {
         let aabb = Aabb::from_points(points.iter().copied());
         let hull = ConvexHull::with_max_vertices(points, 255).ok();
         let inner = hull.as_ref().map_or((aabb.center(), 0.0), |hull| (hull.centroid(), hull.inner_radius()));
+        let inside = hull.as_ref().map(Inside::of_hull);
         let unit_mass = hull.map(|hull| hull.mass_properties(1.0));
-        Ok(Self { points: points.to_vec(), aabb, unit_mass, inner })
+        Ok(Self { points: points.to_vec(), aabb, unit_mass, inner, inside })
     }
 
     /// Only those points that are outermost in one of about `4 steps²` directions: for dense clouds, as of a scan.
@@ -67,6 +71,11 @@ impl PointCloud {
     #[must_use]
     pub fn points(&self) -> &[Vec3] {
         &self.points
+    }
+
+    /// What is well inside.
+    pub(crate) fn inside(&self) -> Option<&Inside> {
+        self.inside.as_ref()
     }
 
     /// The face around the point that is furthest along `d`; where all faces there look away, or where there are none,

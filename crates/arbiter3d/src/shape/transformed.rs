@@ -5,12 +5,14 @@
 
 use super::convex::Feature;
 use super::geometry::Geometry;
+use super::inside::Inside;
 use super::mass::Moments;
 use super::{MassProperties, Shape, ShapeError};
 use crate::math::{Aabb, Mat3, Pose, Real, Vec3, max, max3, min3};
 use crate::narrow_phase::{Ellipsoid, Support};
 use crate::query::{Ray, ShapeHit, cast_ray};
 use glam::{DMat3, DVec3};
+use std::sync::OnceLock;
 
 /// A convex shape after an affine map.
 ///
@@ -31,6 +33,8 @@ pub struct Transformed {
     inner_radius: Real,
     /// Where the shape is a sphere.
     ellipsoid: Option<Ellipsoid>,
+    /// Once it is asked for.
+    inside: OnceLock<Option<Inside>>,
 }
 
 impl Transformed {
@@ -60,7 +64,16 @@ impl Transformed {
         } else {
             None
         };
-        Ok(Self { shape: shape.clone(), linear, translation, inverse, unit_mass, inner_radius, ellipsoid })
+        Ok(Self {
+            shape: shape.clone(),
+            linear,
+            translation,
+            inverse,
+            unit_mass,
+            inner_radius,
+            ellipsoid,
+            inside: OnceLock::new(),
+        })
     }
 
     /// The shape before the map.
@@ -84,6 +97,12 @@ impl Transformed {
     /// What the searches need of an ellipsoid, if it is one.
     pub(crate) fn ellipsoid(&self) -> Option<Ellipsoid> {
         self.ellipsoid
+    }
+
+    /// What continuous collision sweeps of it.
+    pub(crate) fn inside(&self) -> Option<&Inside> {
+        let map = |point: DVec3| double(self.linear) * point + self.translation.as_dvec3();
+        self.inside.get_or_init(|| Inside::of_support(&Support::new(&self.shape)?, map)).as_ref()
     }
 
     pub(crate) fn support(&self, d: DVec3) -> DVec3 {

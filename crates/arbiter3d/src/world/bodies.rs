@@ -1,6 +1,7 @@
 //! Bodies: what the world keeps of them, and how users read and change them.
 
 use super::World;
+use super::continuous::depth_on_body;
 use super::definition::{BodyKind, LockedAxes, validate_mass};
 use super::events::{BeginListener, EndListener};
 use crate::arbiter::{EndReason, NONE};
@@ -37,7 +38,7 @@ pub(crate) struct Body {
     pub awake_place: u32,
     /// Sleeping island the body belongs to.
     pub island: u32,
-    /// Smallest ball inside its shapes, and the farthest a point of it is from the centre of mass.
+    /// Smallest ball inside its shapes (of what is made of parts, its thinnest part), and the farthest a point of it is from the centre of mass.
     pub inner_radius: Real,
     pub reach: Real,
     /// Half the size of the smallest box about the centre of mass that holds its shapes, in its axes.
@@ -61,6 +62,11 @@ impl Body {
             spin.x * half.y + spin.y * half.x,
         );
         min(fastest.length(), spin.length() * self.reach)
+    }
+
+    /// Whether it is a kinematic body that takes along what it would sweep over.
+    pub fn sweeps(&self) -> bool {
+        self.kind == BodyKind::Kinematic && self.enabled && self.continuous && !self.bullet
     }
 
     pub fn is_dynamic(&self) -> bool {
@@ -675,7 +681,7 @@ impl World {
         let body = &self.bodies[index as usize];
         for &slot in &body.shape_slots {
             let shape = &self.shapes[slot as usize];
-            inner = crate::math::min(shape.geometry.inner_radius(), inner);
+            inner = crate::math::min(2.0 * depth_on_body(&shape.geometry, body.kind), inner);
             let center_of_mass = shape.from_center.inverse().position;
             reach = crate::math::max(shape.geometry.reach_from(center_of_mass), reach);
             extents = max3(shape.geometry.aabb(&shape.from_center).farthest_from(Vec3::ZERO), extents);

@@ -110,7 +110,8 @@ pub struct BodyDefinition {
     pub awake: bool,
     /// Whether the body takes part at all. Default true.
     pub enabled: bool,
-    /// Whether continuous collision stops the body at static and kinematic shapes when it is fast. Default true.
+    /// Whether continuous collision stops the body at static and kinematic shapes when it is fast, and a fast kinematic body
+    /// takes along what it would sweep over. Default true.
     pub continuous: bool,
     /// Whether the body is a bullet: when it is fast, it meets dynamic bodies too, other bullets included, and bounces off
     /// within the step, losing no time. Counts while `continuous` is true. A kinematic bullet hits what it sweeps over.

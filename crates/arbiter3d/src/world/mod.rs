@@ -124,7 +124,7 @@ pub struct World {
     wake_scratch: Vec<u32>,
     index_scratch: Vec<u32>,
     /// Where fast bodies stop.
-    stops: Vec<Option<Pose>>,
+    stops: Vec<Option<continuous::Held>>,
     /// Kinematic bodies, sorted; and their shapes on their ways, while fast bodies are looked at.
     kinematic: Vec<u32>,
     /// Bullets, sorted; and what their flight needs.

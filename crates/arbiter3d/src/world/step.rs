@@ -3,7 +3,7 @@
 use super::World;
 use super::bodies::world_inverse_inertia;
 use super::collide::shapes_overlap;
-use super::continuous::{FastBody, KinematicBody};
+use super::continuous::{FastBody, KinematicBody, MOST_TURN};
 use super::pairs::PairRules;
 use super::timings::{Phase, PhaseClock, Timings};
 use crate::arbiter::{Arbiter, Entry, NONE};
@@ -326,7 +326,7 @@ impl World {
         let integrate = IntegrateParameters {
             substep,
             max_linear_speed: settings.max_linear_speed,
-            max_angular_speed: 1.5 / substep,
+            max_angular_speed: MOST_TURN / substep,
         };
         for index in 0..settings.substeps {
             let first = index == 0;
@@ -402,7 +402,7 @@ impl World {
                 BodyNews::Moved(body) => movers.push(body),
             }
         }
-        self.stop_at_impacts(&fast);
+        self.stop_at_impacts(&mut fast);
         self.fly_bullets(&bullets, &movers);
         [&mut fast, &mut bullets, &mut movers].into_iter().for_each(Vec::clear);
         (self.scratch.fast, self.scratch.bullets, self.scratch.movers) = (fast, bullets, movers);

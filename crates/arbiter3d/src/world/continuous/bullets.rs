@@ -7,8 +7,9 @@
 //! bullet bounces between two walls as often as it should within one step. A body that is no bullet goes on in the same way
 //! when a bullet has hit it, but is stopped at the first static shape, as fast bodies are.
 //!
-//! Meetings are dealt with one after the other, in the order of time and then of the bullets' places, so results do
-//! not depend on the number of threads; the first search, which is most of the work, runs on all of them.
+//! Meetings are dealt with one after the other, in the order of time and then of the bullets' places (a heap tells which is
+//! next), so results do not depend on the number of threads. The searches run on all of them: the first one for all bullets,
+//! and after each meeting those of the bullets that it concerns, which are found in a tree of the boxes around all ways.
 //!
 //! A bullet that has touched a shape when the step began is held by its core only, as in ordinary continuous collision: it
 //! rolls, slides and rests by its arbiters. In a new contact the narrow phase leaves a fast bullet alone
@@ -18,19 +19,27 @@
 
 use super::impact::Outcome;
 use super::mover::Mover;
+use super::piece::each_piece;
 use super::way::Way;
 use super::{FastBody, ImpactSearch};
 use crate::arbiter::{ArbiterKey, NONE};
 use crate::broad_phase::{DynamicTree, TreeKind};
-use crate::math::{Aabb, Pose, Real, max};
+use crate::math::{Aabb, Pose, Real, Vec3, max};
 use crate::parallel::SharedSlice;
 use crate::world::World;
 use crate::world::definition::BodyKind;
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
 
 /// Impacts of one body in a step at most: one that is jammed between two others stays where it is for the rest.
 const MOST_IMPACTS: u32 = 64;
 /// Meetings of a bullet in a step at most, those with shapes that it may pass and those of a kinematic one among them.
 const MOST_MEETINGS: u32 = 256;
+
+/// Bodies turn by no more than this in a substep, radians.
+pub(in crate::world) const MOST_TURN: Real = 1.5;
+/// Searches from which on they are spread over threads.
+const SEARCHES_FOR_THREADS: usize = 2;
 
 /// A body that flies through a step, or moves through it.
 #[derive(Clone, Debug)]
@@ -38,8 +47,9 @@ pub(super) struct Track {
     pub body: u32,
     /// Whether its meetings are looked for, rather than those of bullets with it.
     bullet: bool,
-    /// When its present way began: a share of the step. The way goes on to the end of it.
-    time: Real,
+    /// When its present way began: a share of the step. The way goes on to the end of it. In double precision: at a million
+    /// metres a second a step is longer than single precision has centimetres.
+    time: f64,
     way: Way,
     impacts: u32,
     /// How often it has met something as a bullet.
@@ -48,24 +58,26 @@ pub(super) struct Track {
     met: bool,
     leaf: u32,
     next: Option<Meeting>,
+    /// How often its next meeting has been changed: what the heap has of before is out of date.
+    changes: u32,
     /// A shape that it passes in this step, since a filter or a listener wants that.
     pub passes: u32,
 }
 
 impl Track {
     /// Where it is at a time of the step.
-    pub fn at(&self, time: Real) -> Pose {
+    pub fn at(&self, time: f64) -> Pose {
         let left = 1.0 - self.time;
-        if left > 0.0 { self.way.at((time - self.time) / left) } else { self.way.end }
+        if left > 0.0 { self.way.at(((time - self.time) / left) as Real) } else { self.way.end }
     }
 
     /// Its way from a time of the step on.
-    fn rest(&self, time: Real) -> Way {
+    fn rest(&self, time: f64) -> Way {
         let left = 1.0 - self.time;
         if time <= self.time || left <= 0.0 {
             return self.way;
         }
-        Way::new(self.at(time), self.way.end, self.way.turn * ((1.0 - time) / left))
+        Way::new(self.at(time), self.way.end, self.way.turn * ((1.0 - time) / left) as Real)
     }
 }
 
@@ -73,9 +85,46 @@ impl Track {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Meeting {
     /// Share of the step.
-    pub time: Real,
+    pub time: f64,
     /// The bullet's shape and the other one.
     pub slots: [u32; 2],
+}
+
+/// A meeting in the order in which they are dealt with.
+#[derive(Clone, Copy, Debug)]
+struct Due {
+    meeting: Meeting,
+    place: u32,
+    changes: u32,
+}
+
+impl Ord for Due {
+    /// The earliest is the greatest, and of several at one time that of the first bullet. Times are numbers.
+    fn cmp(&self, other: &Self) -> Ordering {
+        let times = other.meeting.time.partial_cmp(&self.meeting.time).unwrap_or(Ordering::Equal);
+        times.then(other.place.cmp(&self.place)).then(self.changes.cmp(&other.changes))
+    }
+}
+
+impl PartialOrd for Due {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Due {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl Eq for Due {}
+
+/// A search for the next meeting of a bullet.
+#[derive(Clone, Copy, Debug)]
+struct Search {
+    place: u32,
+    found: Option<Meeting>,
 }
 
 /// Buffers of the flight, kept from step to step.
@@ -86,7 +135,8 @@ pub(crate) struct FlightScratch {
     places: Vec<u32>,
     /// The boxes around all ways.
     tree: DynamicTree,
-    found: Vec<Option<Meeting>>,
+    due: BinaryHeap<Due>,
+    searches: Vec<Search>,
     /// Arbiters that impacts have made or met.
     pub(super) arbiters: Vec<crate::arbiter::ArbiterId>,
 }
@@ -101,8 +151,10 @@ impl World {
         self.start_tracks(&mut flight, bullets, movers);
         self.find_first_meetings(&mut flight, bullets.len());
         // Each meeting counts for one of its bodies: an end is certain.
-        while let Some((place, meeting)) = next_meeting(&flight.tracks) {
-            self.meet(&mut flight, place, meeting);
+        while let Some(due) = flight.due.pop() {
+            if flight.tracks[due.place as usize].changes == due.changes {
+                self.meet(&mut flight, due.place as usize, due.meeting);
+            }
         }
         self.end_tracks(&mut flight);
         self.flight = flight;
@@ -134,6 +186,7 @@ impl World {
             met: false,
             leaf,
             next: None,
+            changes: 0,
             passes: NONE,
         };
         crate::storage::push(&mut flight.tracks, track);
@@ -145,13 +198,19 @@ impl World {
         Aabb::from_points([way.start.position, way.end.position]).expand(reach)
     }
 
-    /// The first meeting of each bullet, found on all threads.
+    /// The first meeting of each bullet.
     fn find_first_meetings(&mut self, flight: &mut FlightScratch, count: usize) {
         self.list_kinematic_shapes();
-        flight.found.clear();
-        crate::storage::reserve(&mut flight.found, count);
-        flight.found.resize(count, None);
-        let places = SharedSlice::new(&mut flight.found);
+        flight.searches.clear();
+        crate::storage::reserve(&mut flight.searches, count);
+        let search = |place| Search { place, found: None };
+        flight.searches.extend((0..count as u32).map(search));
+        self.search_all(flight, 0.0);
+    }
+
+    /// Does all searches of the list, from a time of the step on, on all threads.
+    fn search_all(&mut self, flight: &mut FlightScratch, time: f64) {
+        let FlightScratch { tracks, places, tree, searches, .. } = &mut *flight;
         let search = FlightSearch {
             impacts: ImpactSearch {
                 shapes: &self.shapes,
@@ -163,18 +222,36 @@ impl World {
                 kinematic: &[],
             },
             arbiters: &self.arbiters,
-            tracks: &flight.tracks,
-            tree: &flight.tree,
-            places: &flight.places,
+            tracks,
+            tree,
+            places,
         };
-        self.pool.run_ranges(count, 1, |range| {
-            for at in range {
-                // SAFETY: each place belongs to one run.
-                unsafe { *places.get_mut(at) = search.first_meeting(at, 0.0) };
+        if searches.len() < SEARCHES_FOR_THREADS {
+            searches.iter_mut().for_each(|wanted| wanted.found = search.next_meeting(wanted.place, time));
+        } else {
+            let count = searches.len();
+            let list = SharedSlice::new(searches);
+            self.pool.run_ranges(count, 1, |range| {
+                for at in range {
+                    // SAFETY: each place belongs to one run.
+                    let wanted = unsafe { list.get_mut(at) };
+                    wanted.found = search.next_meeting(wanted.place, time);
+                }
+            });
+        }
+        for &Search { place, found, .. } in &flight.searches {
+            let track = &mut flight.tracks[place as usize];
+            let stands = match (track.next, found) {
+                (Some(a), Some(b)) => a.time == b.time && a.slots == b.slots,
+                (a, b) => a.is_none() && b.is_none(),
+            };
+            if !stands {
+                track.next = found;
+                track.changes += 1;
+                if let Some(meeting) = found {
+                    flight.due.push(Due { meeting, place, changes: track.changes });
+                }
             }
-        });
-        for (track, found) in flight.tracks.iter_mut().zip(&flight.found) {
-            track.next = *found;
         }
     }
 
@@ -192,6 +269,7 @@ impl World {
                 self.place_center(body, &pose);
             }
         }
+        let before = both.map(|at| flight.tracks.get(at).map(|track| *flight.tree.aabb(track.leaf)));
         let outcome = self.solve_impact(&mut flight.arbiters, &meeting);
         let jammed = flight.tracks.get(both[1]).is_some_and(|track| track.impacts >= MOST_IMPACTS);
         let bullet = &mut flight.tracks[place];
@@ -205,15 +283,19 @@ impl World {
                 self.go_on(flight, (at, body), meeting.time, outcome);
             }
         }
-        self.look_again(flight, both, meeting.time);
+        // The bullet's meeting is over.
+        flight.tracks[place].next = None;
+        flight.tracks[place].changes += 1;
+        self.look_again(flight, (both, before), meeting.time);
     }
 
     /// Gives a body that has met something its way for the rest of the step.
-    fn go_on(&mut self, flight: &mut FlightScratch, (at, body): (usize, u32), time: Real, outcome: Outcome) {
+    fn go_on(&mut self, flight: &mut FlightScratch, (at, body): (usize, u32), time: f64, outcome: Outcome) {
         let track = &mut flight.tracks[at];
         track.met = true;
         if !self.bodies[body as usize].alive || !self.bodies[body as usize].enabled {
             (track.bullet, track.next) = (false, None);
+            track.changes += 1;
             return;
         }
         if outcome == Outcome::Passed || !self.bodies[body as usize].is_dynamic() {
@@ -222,8 +304,12 @@ impl World {
         let here = track.at(time);
         track.impacts += 1;
         let state = &self.solver_bodies.states[body as usize];
-        let left = (1.0 - time) * self.dt;
-        let (way, turn) = (state.linear_velocity * left, state.angular_velocity * left);
+        let left = (1.0 - time) as Real * self.dt;
+        // The next step limits both, and a way is cut into so many parts only.
+        let (way, turn) = (
+            shortened(state.linear_velocity, self.scaled.max_linear_speed) * left,
+            shortened(state.angular_velocity, MOST_TURN * self.scaled.substeps as Real / self.dt) * left,
+        );
         let steps = max((turn.length() * 4.0).ceil(), 1.0);
         let each = turn / steps;
         let rotation = (0..(steps as usize).min(256)).fold(here.rotation, |rotation, _| rotation.integrate(each));
@@ -238,40 +324,36 @@ impl World {
             let search = self.impact_search();
             let slots = &self.bodies[body as usize].shape_slots;
             if let Some(stop) = search.first_stop(slots, &way, search.kinematic) {
-                let end = stop.carried.unwrap_or_else(|| way.at(stop.time));
-                flight.tracks[at].way = Way::new(here, end, turn * stop.time);
+                let end = stop.carried.unwrap_or_else(|| way.at(stop.hit.time));
+                flight.tracks[at].way = Way::new(here, end, turn * stop.hit.time);
             }
         }
         let aabb = self.box_of_way(body, &flight.tracks[at].way);
         flight.tree.move_leaf(flight.tracks[at].leaf, &aabb);
     }
 
-    /// Finds the next meetings of all bullets that two bodies on new ways concern.
-    fn look_again(&mut self, flight: &mut FlightScratch, both: [usize; 2], time: Real) {
-        let boxes = both.map(|at| flight.tracks.get(at).map(|track| *flight.tree.aabb(track.leaf)));
-        let bodies = both.map(|at| flight.tracks.get(at).map_or(NONE, |track| track.body));
-        for place in 0..flight.tracks.len() {
-            let track = &flight.tracks[place];
-            if !track.bullet {
-                flight.tracks[place].next = None;
-                continue;
-            }
-            let meets = |meeting: Meeting| bodies.contains(&self.shapes[meeting.slots[1] as usize].body);
-            let own = flight.tree.aabb(track.leaf);
-            let concerned = both.contains(&place)
-                || track.next.is_some_and(meets)
-                || boxes.iter().flatten().any(|aabb| aabb.overlaps(own));
-            if concerned {
-                let search = FlightSearch {
-                    impacts: self.impact_search(),
-                    arbiters: &self.arbiters,
-                    tracks: &flight.tracks,
-                    tree: &flight.tree,
-                    places: &flight.places,
-                };
-                flight.tracks[place].next = search.first_meeting(place, time);
-            }
+    /// Finds the next meetings of all bullets that two bodies on new ways concern; `before` are the boxes around their old
+    /// ones.
+    fn look_again(&mut self, flight: &mut FlightScratch, (both, before): ([usize; 2], [Option<Aabb>; 2]), time: f64) {
+        let mut searches = std::mem::take(&mut flight.searches);
+        searches.clear();
+        for (at, before) in both.into_iter().zip(before) {
+            let Some(track) = flight.tracks.get(at) else { continue };
+            let now = *flight.tree.aabb(track.leaf);
+            let mut note = |place: u32| {
+                if flight.tracks[place as usize].bullet || flight.tracks[place as usize].next.is_some() {
+                    crate::storage::push(&mut searches, Search { place, found: None });
+                }
+                true
+            };
+            note(at as u32);
+            flight.tree.query(&now, &mut note);
+            before.iter().filter(|before| **before != now).for_each(|before| flight.tree.query(before, &mut note));
         }
+        searches.sort_unstable_by_key(|search| search.place);
+        searches.dedup_by_key(|search| search.place);
+        flight.searches = searches;
+        self.search_all(flight, time);
     }
 
     /// Puts all bodies on the ends of their ways, and breaks the contacts of impacts that they have left behind.
@@ -315,17 +397,10 @@ impl World {
     }
 }
 
-/// The earliest meeting of all, and the bullet's place; of several at one time, that of the first bullet.
-fn next_meeting(tracks: &[Track]) -> Option<(usize, Meeting)> {
-    let mut first: Option<(usize, Meeting)> = None;
-    for (place, track) in tracks.iter().enumerate() {
-        if let Some(meeting) = track.next
-            && first.is_none_or(|(_, earliest)| meeting.time < earliest.time)
-        {
-            first = Some((place, meeting));
-        }
-    }
-    first
+/// A vector no longer than `longest`.
+fn shortened(vector: Vec3, longest: Real) -> Vec3 {
+    let length = vector.length();
+    if length > longest { vector * (longest / length) } else { vector }
 }
 
 /// What a search for meetings reads.
@@ -338,10 +413,10 @@ struct FlightSearch<'a> {
 }
 
 impl FlightSearch<'_> {
-    /// The first meeting of a bullet from a time of the step on.
-    fn first_meeting(&self, place: usize, from: Real) -> Option<Meeting> {
-        let track = &self.tracks[place];
-        let from = max(track.time, from);
+    /// The next meeting of a bullet from a time of the step on.
+    fn next_meeting(&self, place: u32, from: f64) -> Option<Meeting> {
+        let track = &self.tracks[place as usize];
+        let from = if from > track.time { from } else { track.time };
         let body = &self.impacts.bodies[track.body as usize];
         if from >= 1.0 || !track.bullet {
             return None;
@@ -350,66 +425,90 @@ impl FlightSearch<'_> {
         let mut first: Option<Meeting> = None;
         for &slot in &body.shape_slots {
             let shape = &self.impacts.shapes[slot as usize];
-            for part in 0..way.parts {
-                let [begin, end] =
-                    [part, part + 1].map(|node| from + (1.0 - from) * (node as Real / way.parts as Real));
-                if shape.sensor || first.is_some_and(|meeting| meeting.time <= begin) {
-                    break;
-                }
-                let Some(mover) = Mover::new((shape, slot), &way.part(part), true) else { break };
-                self.meet_in_part((track, &mover), [begin, end], &mut first);
+            if shape.sensor {
+                continue;
             }
+            each_piece(shape, &mut |piece| {
+                for part in 0..way.parts {
+                    let [begin, end] =
+                        [part, part + 1].map(|node| from + (1.0 - from) * (node as f64 / way.parts as f64));
+                    if first.is_some_and(|meeting| meeting.time <= begin) {
+                        break;
+                    }
+                    let mover = Mover::new((shape, slot), piece, &way.part(part), true);
+                    self.meet_in_part((track, &mover), [begin, end], &mut first);
+                }
+            });
         }
         first
     }
 
-    /// The first meeting of a bullet's shape between two times, if it is before the one found.
-    fn meet_in_part(&self, (track, mover): (&Track, &Mover<'_>), times: [Real; 2], first: &mut Option<Meeting>) {
+    /// The meeting of a bullet's shape with a shape whose body's frame goes from one pose to another between two times, if it
+    /// is before the one found.
+    fn meet_shape(
+        &self,
+        (track, mover): (&Track, &Mover<'_>),
+        times: [f64; 2],
+        (slot, frames): (u32, [Pose; 2]),
+        first: &mut Option<Meeting>,
+    ) {
         let search = &self.impacts;
+        let other = &search.shapes[slot as usize];
+        if slot == track.passes || !search.may_hit(mover, slot) {
+            return;
+        }
+        let seen = mover.relative_to(&frames.map(|frame| frame.mul(&other.from_center)));
+        if !other.geometry.local_aabb().overlaps(&seen.as_whole().around(2.0 * search.settings.slop)) {
+            return;
+        }
+        // What it touched when the step began has a contact.
+        let touches = track.time == 0.0 && self.touch([mover.slot, slot]);
+        let seen = if touches { seen } else { seen.as_whole() };
+        if let Some(hit) = search.impact_with(&other.geometry, &seen) {
+            let time = times[0] + (times[1] - times[0]) * f64::from(hit.time);
+            if time <= 1.0 && first.is_none_or(|meeting| time < meeting.time) {
+                *first = Some(Meeting { time, slots: [mover.slot, slot] });
+            }
+        }
+    }
+
+    /// The meetings of a bullet's shape with the shapes of a body on a track.
+    fn meet_track(&self, moving: (&Track, &Mover<'_>), times: [f64; 2], other: &Track, first: &mut Option<Meeting>) {
+        let bodies = self.impacts.bodies;
+        let dynamic = [moving.0.body, other.body].map(|body| bodies[body as usize].is_dynamic());
+        if other.body != moving.0.body && (dynamic[0] || dynamic[1]) {
+            let frames = times.map(|time| other.at(time));
+            for &slot in &bodies[other.body as usize].shape_slots {
+                self.meet_shape(moving, times, (slot, frames), first);
+            }
+        }
+    }
+
+    /// The first meeting of a bullet's shape between two times, if it is before the one found.
+    fn meet_in_part(&self, moving: (&Track, &Mover<'_>), times: [f64; 2], first: &mut Option<Meeting>) {
+        let (search, (track, mover)) = (&self.impacts, moving);
         let slop = search.settings.slop;
         let around = mover.as_whole().around(2.0 * slop);
         let dynamic = search.bodies[track.body as usize].is_dynamic();
-        let mut consider = |slot: u32, frames: [Pose; 2]| {
-            let other = &search.shapes[slot as usize];
-            if slot == track.passes || !search.may_hit(mover, slot) {
-                return;
-            }
-            let seen = mover.relative_to(&frames.map(|frame| frame.mul(&other.from_center)));
-            if !other.geometry.local_aabb().overlaps(&seen.as_whole().around(2.0 * slop)) {
-                return;
-            }
-            // What it touched when the step began has a contact.
-            let touches = track.time == 0.0 && self.touch([mover.slot, slot]);
-            let seen = if touches { seen } else { seen.as_whole() };
-            if let Some(t) = search.impact_with(&other.geometry, &seen) {
-                let time = times[0] + (times[1] - times[0]) * t;
-                if time <= 1.0 && first.is_none_or(|meeting| time < meeting.time) {
-                    *first = Some(Meeting { time, slots: [mover.slot, slot] });
-                }
-            }
-        };
         if dynamic {
             search.broad_phase.query_static(&around, |slot| {
                 let body = search.shapes[slot as usize].body as usize;
                 if search.bodies[body].kind == BodyKind::Static {
-                    consider(slot, [search.solver.masses[body].pose(); 2]);
+                    self.meet_shape(moving, times, (slot, [search.solver.masses[body].pose(); 2]), first);
                 }
             });
         }
-        let may_meet = |body: u32| body != track.body && (dynamic || search.bodies[body as usize].is_dynamic());
         self.tree.query(&around, |place| {
-            let other = &self.tracks[place as usize];
-            if may_meet(other.body) {
-                let frames = times.map(|time| other.at(time));
-                search.bodies[other.body as usize].shape_slots.iter().for_each(|&slot| consider(slot, frames));
-            }
+            self.meet_track(moving, times, &self.tracks[place as usize], first);
             true
         });
         // What has hardly moved stands where it is; its box is where it was at most a slop ago.
         search.broad_phase.tree(TreeKind::Moving).query(&around.expand(2.0 * slop), |slot| {
             let body = search.shapes[slot as usize].body;
-            if self.places[body as usize] == NONE && may_meet(body) {
-                consider(slot, [search.solver.masses[body as usize].pose(); 2]);
+            let may_meet = body != track.body && (dynamic || search.bodies[body as usize].is_dynamic());
+            if self.places[body as usize] == NONE && may_meet {
+                let frame = search.solver.masses[body as usize].pose();
+                self.meet_shape(moving, times, (slot, [frame; 2]), first);
             }
             true
         });

@@ -221,7 +221,7 @@ impl World {
         if solve.count == 0 {
             return Outcome::Passed; // a listener has taken the contacts away
         }
-        self.note_impact(index, slots, &solve, meeting.time);
+        self.note_impact(index, slots, &solve, meeting.time as Real);
         Outcome::Solved
     }
 

@@ -1,11 +1,13 @@
 //! Continuous collision: fast dynamic bodies are stopped at static and kinematic shapes that they would pass through.
 //!
 //! A body is fast when some point of it has moved farther in the step than half its inner radius, by going or by turning. Its
-//! shapes are swept from where they were to where they are ([`way`]) against the static tree and the kinematic shapes; at
-//! the first impact the body stays where it came within a slop of touching, with its velocity. Contact is then found in the
-//! next step, which turns the velocity away. The rest of the step's motion is lost. (Bullets lose nothing: see [`bullets`].)
+//! shapes, piece by piece ([`piece`]), are swept from where they were to where they are ([`way`]) against the static tree and the
+//! kinematic shapes; at the first impact the body stays where it came within a slop of touching, with the velocity that it had
+//! there. Contact is then found in the next step, which turns the velocity away. The rest of the step's motion is lost: to go on
+//! would be to leave the place where it hits. (Bullets lose nothing: see [`bullets`].) Only what was in contact already goes
+//! on, along what holds it.
 //!
-//! Every shape has a core, which is thinner by half its inner radius ([`mover`]). Only a shape whose core would hit is stopped:
+//! Every piece has a core, which is thinner by half its inner radius. Only a shape whose core would hit is stopped:
 //! what merely slides or rolls on a floor comes near ever new triangles of it, and must not be held. A shape that comes from
 //! afar is stopped where its surface hits; one that starts the step within the speculative distance has a contact
 //! already, which lets it go along the surface or away, and is stopped where its core hits. So only what the core comes
@@ -13,13 +15,15 @@
 //! leaves nothing for a log that rolls over ten thousand triangles.
 //!
 //! Against a kinematic shape the way is that seen from the shape, and a body that hits goes on with the shape to the end of the
-//! step: a door takes along what has run into it.
+//! step: a door takes along what has run into it. A kinematic body that is itself fast takes along what is slow or asleep too; the
+//! next step finds the contact and strikes.
 //!
 //! Source: conservative advancement, Mirtich, "Impulse-based Dynamic Simulation", 1996.
 
 mod bullets;
 mod impact;
 mod mover;
+mod piece;
 #[cfg(test)]
 mod tests;
 mod way;
@@ -31,16 +35,28 @@ use super::filters::UserFilters;
 use super::one_way;
 use super::settings::WorldSettings;
 use super::shapes::ShapeSlot;
-use crate::broad_phase::BroadPhase;
+use crate::arbiter::NONE;
+use crate::broad_phase::{BroadPhase, TreeKind};
 use crate::math::{Aabb, Pose, Real, Vec3, min};
-use crate::narrow_phase::{Support, Sweep, gap, time_of_impact};
+use crate::narrow_phase::{Support, Sweep, Touch, first_touch, gap};
 use crate::parallel::SharedSlice;
-use crate::shape::{MeshSides, Shape, Surface};
+use crate::shape::{Cuboid, MeshSides, Shape, Surface};
 use crate::solver::SolverBodies;
 pub(crate) use bullets::FlightScratch;
+pub(super) use bullets::MOST_TURN;
 pub use impact::Impact;
 use mover::{Mover, is_fast};
+pub(super) use piece::depth_on_body;
+use piece::{Piece, each_piece, has_pieces};
 use way::{Way, turned_back};
+
+/// How far a body goes on at most along what holds it in a step, in speculative distances: a metre by default. What would go
+/// farther stays: the contact that it has had says little of what it would slide on.
+const MOST_SLIDE: Real = 50.0;
+/// How often a body goes on along what holds it in a step.
+const MOST_SLIDES: usize = 4;
+/// Share of its way that a body has to get on for its turn to go on too.
+const LEAST_PROGRESS: Real = 1e-3;
 
 /// A body that may have passed through something, and the pose of its centre of mass when the step began.
 #[derive(Clone, Copy, Debug)]
@@ -79,12 +95,17 @@ pub(crate) struct KinematicShape {
 }
 
 impl World {
-    /// Stops fast bodies at the first static or kinematic shapes on their ways.
-    pub(crate) fn stop_at_impacts(&mut self, fast: &[FastBody]) {
-        if fast.is_empty() {
+    /// Stops fast bodies at the first static or kinematic shapes on their ways, and has fast kinematic bodies take along what
+    /// they would sweep over.
+    pub(crate) fn stop_at_impacts(&mut self, fast: &mut Vec<FastBody>) {
+        let swept_over = self.kinematic_sweeps();
+        if fast.is_empty() && !swept_over {
             return;
         }
         self.list_kinematic_shapes();
+        if swept_over {
+            self.list_swept_over(fast);
+        }
         let mut stops = std::mem::take(&mut self.stops);
         stops.clear();
         crate::storage::reserve(&mut stops, fast.len());
@@ -106,11 +127,79 @@ impl World {
             }
         });
         for (body, stop) in fast.iter().zip(&stops) {
-            if let Some(at) = stop {
-                self.stop_at(body.index, at);
+            if let Some(stop) = stop {
+                if !self.bodies[body.index as usize].awake {
+                    self.wake(body.index);
+                }
+                self.stop_at(body.index, &stop.at);
+                self.take_back(body.index, stop);
             }
         }
         self.stops = stops;
+    }
+
+    /// Takes back what speed towards an obstacle a body has gained in the part of the step that it has not moved for. What
+    /// falls on a floor would hit it too fast by up to `g dt`.
+    fn take_back(&mut self, index: u32, stop: &Held) {
+        let state = &mut self.solver_bodies.states[index as usize];
+        let (approach, gained) = (
+            -state.linear_velocity.dot(stop.normal),
+            -self.solver_bodies.motions[index as usize].acceleration.dot(stop.normal) * (stop.lost * self.dt),
+        );
+        if approach > 0.0 && gained > 0.0 {
+            let free = self.bodies[index as usize].locked_axes.free().0;
+            state.linear_velocity += free * stop.normal * min(gained, approach);
+        }
+    }
+
+    /// Whether a kinematic body that is no bullet moves farther in this step than it is thick.
+    fn kinematic_sweeps(&self) -> bool {
+        let sweeps = |index: u32| {
+            let (body, state) = (&self.bodies[index as usize], &self.solver_bodies.states[index as usize]);
+            let way = state.translation.length() + state.turn.length() * body.reach;
+            body.sweeps() && body.awake && way > body.inner_radius
+        };
+        self.scaled.continuous && self.kinematic.iter().any(|&index| sweeps(index))
+    }
+
+    /// Appends the slow and the sleeping bodies that kinematic ones may have swept over.
+    fn list_swept_over(&self, fast: &mut Vec<FastBody>) {
+        let known = fast.len();
+        let near = self.scaled.speculative_distance;
+        for moving in &self.kinematic_shapes {
+            let shape = &self.shapes[moving.slot as usize];
+            let bat = &self.bodies[shape.body as usize];
+            if !bat.sweeps() || moving.way.length_at(shape) <= bat.inner_radius {
+                continue;
+            }
+            self.broad_phase.tree(TreeKind::Moving).query(&moving.bounds.expand(near), |slot| {
+                let index = self.shapes[slot as usize].body;
+                let body = &self.bodies[index as usize];
+                if body.is_dynamic() && body.continuous && !body.bullet && body.enabled && !body.frozen {
+                    let end = self.solver_bodies.masses[index as usize].pose();
+                    let state = &self.solver_bodies.states[index as usize];
+                    let moved = if body.awake { state.translation } else { Vec3::ZERO };
+                    let turn = if body.awake { state.turn } else { Vec3::ZERO };
+                    let start = Pose::new(end.position - moved, turned_back(end.rotation, turn));
+                    crate::storage::push(fast, FastBody { index, start });
+                }
+                true
+            });
+        }
+        // Fast ones have been listed with the pose that they had.
+        let (before, found) = fast.split_at_mut(known);
+        found.sort_unstable_by_key(|body| body.index);
+        let mut kept = known;
+        let mut last = NONE;
+        for at in 0..found.len() {
+            let body = found[at];
+            if body.index != last && before.binary_search_by_key(&body.index, |body| body.index).is_err() {
+                found[kept - known] = body;
+                kept += 1;
+            }
+            last = body.index;
+        }
+        fast.truncate(kept);
     }
 
     /// Lists the kinematic bodies, where they go in this step.
@@ -186,76 +275,159 @@ struct ImpactSearch<'a> {
     kinematic: &'a [KinematicShape],
 }
 
+/// Where a body is held.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Held {
+    at: Pose,
+    /// From what holds it to the body.
+    normal: Vec3,
+    /// Share of the step in which it has not moved towards that.
+    lost: Real,
+}
+
+/// An impact with a shape.
+#[derive(Clone, Copy)]
+struct Hit {
+    /// Share of the way, 0 to 1.
+    time: Real,
+    /// Unit vector from that shape, in its frame.
+    normal: Vec3,
+    /// Whether there was a contact when the way began.
+    touches: bool,
+}
+
 /// Where a way is blocked.
 #[derive(Clone, Copy)]
 struct Stop {
-    /// Share of the way, 0 to 1.
-    time: Real,
+    /// The normal is in world space.
+    hit: Hit,
     /// Where a kinematic shape takes the body to.
     carried: Option<Pose>,
 }
 
 impl ImpactSearch<'_> {
     /// Where the centre frame of a body is to be stopped, if it is.
-    fn stop_of(&self, fast: &FastBody) -> Option<Pose> {
+    fn stop_of(&self, fast: &FastBody) -> Option<Held> {
         let state = &self.solver.states[fast.index as usize];
         let end = self.solver.masses[fast.index as usize].pose();
-        let way = Way::new(fast.start, end, state.turn);
-        let slots = &self.bodies[fast.index as usize].shape_slots;
+        let body = &self.bodies[fast.index as usize];
+        let turn = if body.awake { state.turn } else { Vec3::ZERO };
+        let way = Way::new(fast.start, end, turn);
+        let slots = &body.shape_slots;
         let first = self.first_stop(slots, &way, self.kinematic)?;
-        let Some(carried) = first.carried else { return Some(way.at(first.time)) };
+        let (time, normal) = (first.hit.time, first.hit.normal);
+        let Some(carried) = first.carried else {
+            if first.hit.touches {
+                return Some(self.slide(body, &way, first.hit));
+            }
+            return Some(Held { at: way.at(time), normal, lost: 1.0 - time });
+        };
         // What takes it along must not take it through a wall.
-        let rest = Way::new(way.at(first.time), carried, state.turn * (1.0 - first.time));
-        Some(self.first_stop(slots, &rest, &[]).map_or(carried, |stop| rest.at(stop.time)))
+        let rest = Way::new(way.at(time), carried, turn * (1.0 - time));
+        let at = self.first_stop(slots, &rest, &[]).map_or(carried, |stop| rest.at(stop.hit.time));
+        Some(Held { at, normal, lost: 0.0 })
+    }
+
+    /// Lets a body go on along what holds it. It has had a contact with that for all of the step, so its velocity is what the
+    /// contact has made of it; only what is new (of a body that comes from afar) has to be met where it is.
+    ///
+    /// What is left of the way has its part towards the obstacle taken out; where turning alone is what is held, the body
+    /// goes on without it.
+    fn slide(&self, body: &Body, way: &Way, hit: Hit) -> Held {
+        let slots = &body.shape_slots;
+        let free = body.locked_axes.free().0;
+        let (mut way, mut hit, mut normals) = (*way, hit, [Vec3::ZERO; MOST_SLIDES]);
+        for at in 0..MOST_SLIDES {
+            let here = way.at(hit.time);
+            let left = 1.0 - hit.time;
+            normals[at] = hit.normal;
+            let along = free * along_all((way.end.position - way.start.position) * left, &normals[..=at]);
+            if along.length() > MOST_SLIDE * self.settings.speculative_distance {
+                return Held { at: here, normal: hit.normal, lost: 0.0 };
+            }
+            // What is held at once is held by its turning, or by more than one obstacle.
+            let turns = hit.time > LEAST_PROGRESS && at + 2 < MOST_SLIDES;
+            let (rotation, turn) =
+                if turns { (way.end.rotation, way.turn * left) } else { (here.rotation, Vec3::ZERO) };
+            way = Way::new(here, Pose::new(here.position + along, rotation), turn);
+            match self.first_stop(slots, &way, self.kinematic) {
+                None => return Held { at: way.end, normal: hit.normal, lost: 0.0 },
+                Some(stop) if stop.carried.is_some() || !stop.hit.touches => {
+                    return Held { at: way.at(stop.hit.time), normal: stop.hit.normal, lost: 0.0 };
+                }
+                Some(stop) => hit = stop.hit,
+            }
+        }
+        Held { at: way.at(hit.time), normal: hit.normal, lost: 0.0 }
     }
 
     /// The first impact of the shapes of a body on its way.
     fn first_stop(&self, slots: &[u32], way: &Way, kinematic: &[KinematicShape]) -> Option<Stop> {
-        let mut first = None;
-        let mut limit = 1.0;
+        let mut first: Option<Stop> = None;
         for &slot in slots {
             let shape = &self.shapes[slot as usize];
-            if shape.sensor || !is_fast(shape, way, 0.0) {
+            if shape.sensor || kinematic.is_empty() && has_pieces(&shape.geometry) && self.is_clear(shape, None, way) {
                 continue;
             }
-            if kinematic.is_empty() && self.is_clear(shape, way) {
-                continue;
-            }
-            for part in 0..way.parts {
-                let from = part as Real / way.parts as Real;
-                if from >= limit {
-                    break;
+            each_piece(shape, &mut |piece| {
+                let fast = is_fast(piece, way, 0.0);
+                if !fast && kinematic.is_empty() {
+                    return;
                 }
-                let ends = way.part(part);
-                let Some(mover) = Mover::new((shape, slot), &ends, Mover::turns_much(way)) else { break };
-                let found = self.first_impact(&mover).map(|time| Stop { time, carried: None });
-                let found = self.first_carrier(&mover, (&ends, way, part), (found, kinematic));
-                if let Some(stop) = found {
-                    let time = (part as Real + stop.time) / way.parts as Real;
-                    if time < limit {
-                        limit = time;
-                        first = Some(Stop { time, ..stop });
-                    }
-                    break;
+                if kinematic.is_empty() && self.is_clear(shape, Some(piece), way) {
+                    return;
                 }
-            }
+                self.stop_piece((shape, slot, piece), way, (fast, kinematic), &mut first);
+            });
         }
         first
+    }
+
+    /// The first impact of a piece, if it is before the one found.
+    fn stop_piece(
+        &self,
+        (shape, slot, piece): (&ShapeSlot, u32, &Piece<'_>),
+        way: &Way,
+        (fast, kinematic): (bool, &[KinematicShape]),
+        first: &mut Option<Stop>,
+    ) {
+        for part in 0..way.parts {
+            let from = part as Real / way.parts as Real;
+            let limit = first.map_or(1.0, |stop| stop.hit.time);
+            if from >= limit {
+                break;
+            }
+            let mut ends = way.part(part);
+            // Of what is made of many pieces, most come nowhere before the first of them hits.
+            let until = if has_pieces(&shape.geometry) { limit * way.parts as Real - part as Real } else { 1.0 };
+            let until = if until < 1.0 { until } else { 1.0 };
+            if until < 1.0 {
+                ends[1] = ends[0].interpolate(&ends[1], until);
+            }
+            let mover = Mover::new((shape, slot), piece, &ends, Mover::turns_much(way));
+            let found = if fast { self.first_impact(&mover) } else { None };
+            let found = found.map(|hit| Stop { hit, carried: None });
+            let found = self.first_carrier(&mover, (&ends, way, [from, until / way.parts as Real]), (found, kinematic));
+            if let Some(stop) = found {
+                let time = (part as Real + stop.hit.time * until) / way.parts as Real;
+                if time < limit {
+                    *first = Some(Stop { hit: Hit { time, ..stop.hit }, ..stop });
+                }
+                break;
+            }
+        }
     }
 
     /// Whether nothing static is near the way of a shape but meshes, of which no triangle is: told by balls around the
     /// centre of mass, long before the shape's own box is made.
     ///
-    /// A shape turns about the middle of its core, which goes straight beside the centre of mass and at its distance
+    /// A piece turns about the middle of its core, which goes straight beside the centre of mass and at its distance
     /// from that one; so no point comes farther from the way of the centre than the farthest is from it at first, and
-    /// twice that distance.
-    fn is_clear(&self, shape: &ShapeSlot, way: &Way) -> bool {
-        let pivot = match &shape.geometry {
-            Shape::Sphere(_) | Shape::Capsule(_) | Shape::Cuboid(_) => shape.from_center.position,
-            Shape::Hull(hull) => shape.from_center.transform_point(hull.centroid()),
-            _ => return false,
-        };
-        let reach = shape.middle.length() + shape.reach + 2.0 * pivot.length();
+    /// twice that distance. Without a `piece` all of them are meant.
+    fn is_clear(&self, shape: &ShapeSlot, piece: Option<&Piece<'_>>, way: &Way) -> bool {
+        let farthest = shape.middle.length() + shape.reach;
+        let pivot = piece.map_or(farthest, |piece| piece.place.transform_point(piece.middle()).length());
+        let reach = farthest + 2.0 * pivot;
         let path = Aabb::from_points([way.start.position, way.end.position]);
         let around = path.expand(reach + self.settings.speculative_distance + 2.0 * self.settings.slop);
         let mut clear = true;
@@ -273,10 +445,10 @@ impl ImpactSearch<'_> {
         clear
     }
 
-    /// Share of the path at which a shape first comes within a slop of a static one.
+    /// Where on its path a shape first comes within a slop of a static one; the normal is in world space.
     ///
     /// Nothing stops a shape but what its core would hit, so that alone is looked for.
-    fn first_impact(&self, mover: &Mover<'_>) -> Option<Real> {
+    fn first_impact(&self, mover: &Mover<'_>) -> Option<Hit> {
         let mut first = None;
         let near = 2.0 * self.settings.slop;
         self.broad_phase.query_static(&mover.around(near), |slot| {
@@ -286,18 +458,19 @@ impl ImpactSearch<'_> {
                 let pose = body.pose.mul(&other.pose);
                 let seen = mover.relative_to(&[pose; 2]);
                 if !self.lets_pass(other, &seen) {
-                    first = earlier(first, self.impact_with(&other.geometry, &seen));
+                    first = earlier(first, self.impact_with(&other.geometry, &seen).map(|hit| hit.turned(&pose)));
                 }
             }
         });
         first
     }
 
-    /// The first impact with a kinematic shape in part `part` of a way, if it comes before the one `found`.
+    /// The first impact with a kinematic shape in a part of a way (from a share of it on, so much of it), if it comes before
+    /// the one `found`.
     fn first_carrier(
         &self,
         mover: &Mover<'_>,
-        (ends, way, part): (&[Pose; 2], &Way, usize),
+        (ends, way, [from, share]): (&[Pose; 2], &Way, [Real; 2]),
         (found, kinematic): (Option<Stop>, &[KinematicShape]),
     ) -> Option<Stop> {
         let mut first = found;
@@ -309,23 +482,25 @@ impl ImpactSearch<'_> {
         for fixed in kinematic.iter().filter(|fixed| fixed.bounds.overlaps(&around) && self.may_hit(mover, fixed.slot))
         {
             let other = &self.shapes[fixed.slot as usize];
-            let frames = [part, part + 1].map(|node| fixed.way.at(node as Real / way.parts as Real));
+            let frames = [fixed.way.at(from), fixed.way.at(from + share)];
             let [start, end] = [0, 1].map(|at| frames[at].relative(&ends[at]));
             // What goes along with a drum is slow, seen from there; and nothing slow gets through what is thick.
-            let turn = (way.turn - fixed.way.turn) / way.parts as Real;
-            if !is_fast(mover.shape, &Way::new(start, end, turn), other.geometry.inner_radius()) {
+            let turn = (way.turn - fixed.way.turn) * share;
+            let slack = self.bodies[other.body as usize].inner_radius;
+            if !is_fast(&mover.piece, &Way::new(start, end, turn), slack) {
                 continue;
             }
             // Seen from a body that moves, ways are bent; swept about the centre, so that the body goes as its shape does.
             let from_other = other.from_center.inverse();
             let seen = [start, end].map(|pose| from_other.mul(&pose));
-            let Some(seen) = Mover::new((mover.shape, mover.slot), &seen, true) else { continue };
+            let seen = Mover::new((mover.shape, mover.slot), &mover.piece, &seen, true);
             if !other.geometry.local_aabb().overlaps(&seen.around(near)) || self.lets_pass(other, &seen) {
                 continue;
             }
-            let Some(time) = self.impact_with(&other.geometry, &seen) else { continue };
-            if first.is_none_or(|stop| time < stop.time) {
-                first = Some(Stop { time, carried: Some(fixed.way.end.mul(&start.interpolate(&end, time))) });
+            let Some(hit) = self.impact_with(&other.geometry, &seen) else { continue };
+            if first.is_none_or(|stop| hit.time < stop.hit.time) {
+                let carried = Some(fixed.way.end.mul(&start.interpolate(&end, hit.time)));
+                first = Some(Stop { hit: hit.turned(&fixed.way.end.mul(&other.from_center)), carried });
             }
         }
         first
@@ -345,14 +520,15 @@ impl ImpactSearch<'_> {
     }
 
     /// First impact with a shape, in whose frame the mover is.
-    fn impact_with(&self, geometry: &Shape, mover: &Mover<'_>) -> Option<Real> {
+    fn impact_with(&self, geometry: &Shape, mover: &Mover<'_>) -> Option<Hit> {
         match geometry {
             Shape::Mesh(mesh) => self.mesh_impact(Surface::Mesh(mesh), mover),
             Shape::HeightField(field) => self.mesh_impact(Surface::Field(field), mover),
             Shape::Compound(compound) => {
                 let mut first = None;
                 compound.for_each_child(&mover.around(2.0 * self.settings.slop), |_, child, pose| {
-                    first = earlier(first, self.impact_with(child, &mover.relative_to(&[*pose; 2])));
+                    let hit = self.impact_with(child, &mover.relative_to(&[*pose; 2]));
+                    first = earlier(first, hit.map(|hit| hit.turned(pose)));
                 });
                 first
             }
@@ -364,12 +540,20 @@ impl ImpactSearch<'_> {
                 });
                 first
             }
+            Shape::HalfSpace(_) => {
+                // All of it that is within reach: a block with its top at height zero.
+                let around = mover.around(2.0 * self.settings.slop);
+                let half = around.half_extents().max_element() + around.min.y.abs() + 1.0;
+                let middle = Vec3::new(around.center().x, -half, around.center().z);
+                let block = Cuboid::new(Vec3::splat(half)).ok()?;
+                self.impact(&Support::Cuboid(block), &mover.relative_to(&[Pose::from_position(middle); 2]))
+            }
             convex => Support::new(convex).and_then(|fixed| self.impact(&fixed, mover)),
         }
     }
 
     /// First impact with a triangle of a mesh, coming from its solid side; all in the mesh's frame.
-    fn mesh_impact(&self, mesh: Surface<'_>, mover: &Mover<'_>) -> Option<Real> {
+    fn mesh_impact(&self, mesh: Surface<'_>, mover: &Mover<'_>) -> Option<Hit> {
         let near = 2.0 * self.settings.slop;
         let mut first = None;
         let swings = mover.swings();
@@ -390,36 +574,68 @@ impl ImpactSearch<'_> {
     }
 
     /// First impact with a convex shape at the origin.
-    fn impact(&self, fixed: &Support<'_>, mover: &Mover<'_>) -> Option<Real> {
+    fn impact(&self, fixed: &Support<'_>, mover: &Mover<'_>) -> Option<Hit> {
         let (still, slop) = (Sweep::still(Pose::IDENTITY), self.settings.slop);
+        let touch = |shape: &Support<'_>, path: &Sweep| first_touch(fixed, &still, shape, path, slop);
         if mover.whole && gap(fixed, &mover.support, &mover.path.start) > 0.0 {
-            return time_of_impact(fixed, &still, &mover.support, &mover.path, slop);
+            return touch(&mover.support, &mover.path).map(Hit::from_afar);
         }
         // A violent step before can have pushed the core in: then its spine stays on this side, or at least its very middle.
         if gap(fixed, &mover.core, &mover.core_path.start) <= 0.0 {
-            if let Some(spine) = mover.spine()
-                && gap(fixed, &spine, &mover.core_path.start) > 0.0
+            if let Some((spine, path)) = mover.spine()
+                && gap(fixed, &spine, &path.start) > 0.0
             {
-                return time_of_impact(fixed, &still, &spine, &mover.core_path, slop);
+                return touch(&spine, &path).map(Hit::of_contact);
             }
             let (middle, path) = mover.middle();
-            let hit = time_of_impact(fixed, &still, &middle, &path, slop)?;
+            let hit = touch(&middle, &path).map(Hit::of_contact)?;
             let no_nearer = gap(fixed, &middle, &path.start) <= middle.radius();
-            return Some(if no_nearer { 0.0 } else { hit }); // half the gap in each step is nothing in the end
+            return Some(if no_nearer { Hit { time: 0.0, ..hit } } else { hit }); // half the gap in each step is nothing in the end
         }
-        let core = time_of_impact(fixed, &still, &mover.core, &mover.core_path, slop)?;
+        let core = touch(&mover.core, &mover.core_path)?;
         if gap(fixed, &mover.support, &mover.path.start) <= self.settings.speculative_distance {
-            return Some(core);
+            return Some(Hit::of_contact(core));
         }
-        let surface = time_of_impact(fixed, &still, &mover.support, &mover.path, slop);
-        Some(surface.map_or(core, |surface| min(surface, core)))
+        let surface = touch(&mover.support, &mover.path);
+        let first = surface.filter(|surface| surface.time < core.time).unwrap_or(core);
+        Some(Hit::from_afar(first))
     }
 }
 
-/// The earlier of two times, of which either may be missing.
-fn earlier(a: Option<Real>, b: Option<Real>) -> Option<Real> {
+impl Hit {
+    fn from_afar(Touch { time, normal }: Touch) -> Self {
+        Self { time, normal, touches: false }
+    }
+
+    fn of_contact(touch: Touch) -> Self {
+        Self { touches: true, ..Self::from_afar(touch) }
+    }
+
+    /// The same with its normal in the frame from which `pose` places the shape.
+    fn turned(self, pose: &Pose) -> Self {
+        Self { normal: pose.rotation.rotate(self.normal), ..self }
+    }
+}
+
+/// The earlier of two hits, of which either may be missing.
+fn earlier(a: Option<Hit>, b: Option<Hit>) -> Option<Hit> {
     match (a, b) {
-        (Some(a), Some(b)) => Some(min(a, b)),
+        (Some(a), Some(b)) => Some(if b.time < a.time { b } else { a }),
         (a, b) => a.or(b),
     }
+}
+
+/// What of a way is left that goes into none of the obstacles with these normals: along the last, or along the edge of two.
+fn along_all(way: Vec3, normals: &[Vec3]) -> Vec3 {
+    let Some((last, before)) = normals.split_last() else { return way };
+    let mut along = way - *last * min(way.dot(*last), 0.0);
+    for normal in before {
+        if along.dot(*normal) < 0.0 {
+            let edge = last.cross(*normal);
+            let squared = edge.length_squared();
+            along = if squared > 1e-6 { edge * (along.dot(edge) / squared) } else { Vec3::ZERO };
+        }
+    }
+    // Into a corner of three.
+    if before.iter().any(|normal| along.dot(*normal) < -1e-5 * way.length()) { Vec3::ZERO } else { along }
 }

@@ -1,9 +1,10 @@
-//! A shape on its way through a part of a step, with its core: the shape made thinner by half its inner radius.
+//! A piece of a shape on its way through a part of a step, with its core.
 
+use super::piece::{Core, Piece};
 use super::way::Way;
 use crate::math::{Aabb, Pose, Real, Vec3, max, min};
 use crate::narrow_phase::{Support, Sweep};
-use crate::shape::{Capsule, Cuboid, Cylinder, Shape, Sphere};
+use crate::shape::Sphere;
 use crate::world::shapes::ShapeSlot;
 
 /// From this turn on (radians) a shape is swept about its body's centre of mass. Below, about its own middle, which then goes
@@ -11,78 +12,24 @@ use crate::world::shapes::ShapeSlot;
 /// shape is small and far out.
 const TURN_ABOUT_CENTER: Real = 0.3;
 
-/// The core of a shape, in the shape's frame but for `shift`.
-#[derive(Clone, Copy)]
-struct Core<'a> {
-    support: Support<'a>,
-    /// Where the core's frame sits in the shape's frame.
-    shift: Vec3,
-    /// Its middle, in its frame.
-    middle: Vec3,
-}
-
-impl<'a> Core<'a> {
-    /// `None` for what is not convex.
-    fn new(shape: &'a Shape) -> Option<Self> {
-        let thickness = 0.5 * shape.inner_radius();
-        let centered = |support: Support<'a>| Self { support, shift: Vec3::ZERO, middle: Vec3::ZERO };
-        Some(match shape {
-            Shape::Sphere(_) => centered(Support::Sphere(Sphere::new(thickness).ok()?)),
-            Shape::Capsule(s) => centered(Support::Capsule(Capsule::new(s.half_length(), thickness).ok()?)),
-            Shape::Cuboid(s) => centered(Support::Cuboid(Cuboid::new(s.half_extents() - Vec3::splat(thickness)).ok()?)),
-            Shape::Hull(hull) => {
-                Self { support: Support::Points(hull.core()), shift: Vec3::ZERO, middle: hull.centroid() }
-            }
-            Shape::Cylinder(s) => {
-                let core = Cylinder::new(s.half_length() - thickness, s.radius() - thickness).ok()?;
-                centered(Support::Cylinder(core))
-            }
-            // Of what is made of parts, the ball in the thickest of them.
-            Shape::Compound(_) | Shape::Voxels(_) => {
-                let ball = Support::Sphere(Sphere::new(thickness).ok()?);
-                Self { support: ball, shift: shape.inner_ball().0, middle: Vec3::ZERO }
-            }
-            // A copy of half the size about the middle is inside by half the inner radius.
-            other if thickness > 0.0 && Support::new(other).is_some() => {
-                let center = other.inner_ball().0;
-                Self {
-                    support: Support::Scaled { shape: other, center, factor: 0.5 },
-                    shift: Vec3::ZERO,
-                    middle: center,
-                }
-            }
-            _ => return None,
-        })
-    }
-
-    /// How far the core reaches out from its middle, beyond a ball of the thickness.
-    fn length(&self, thickness: Real) -> Real {
-        match &self.support {
-            Support::Sphere(_) => 0.0,
-            Support::Capsule(s) => s.half_length(),
-            support => support.reach(self.middle) - thickness,
-        }
-    }
-}
-
-/// Whether some point of a shape's core has moved so far that its surface may have been passed, or `slack` farther. Of a body
+/// Whether some point of a piece's core has moved so far that its surface may have been passed, or `slack` farther. Of a body
 /// of many shapes (a tree that falls) most have not.
-pub(super) fn is_fast(shape: &ShapeSlot, way: &Way, slack: Real) -> bool {
-    let Some(core) = Core::new(&shape.geometry) else { return false };
-    let thickness = 0.5 * shape.geometry.inner_radius();
-    let middle = shape.from_center.transform_point(core.shift + core.middle);
+pub(super) fn is_fast(piece: &Piece<'_>, way: &Way, slack: Real) -> bool {
+    let thickness = piece.thickness();
+    let middle = piece.place.transform_point(piece.middle());
     let moved = (way.end.transform_point(middle) - way.start.transform_point(middle)).length();
     // After more than half a turn the middle may be back.
     let around = if way.parts > 1 { way.turn.length() * middle.length() } else { 0.0 };
     let moved = moved + around;
-    moved > thickness + slack || moved + way.turn.length() * core.length(thickness) > thickness + slack
+    moved > thickness + slack || moved + way.turn.length() * piece.length() > thickness + slack
 }
 
-/// A shape on its way through a part of a step.
+/// A piece of a shape on its way through a part of a step.
 #[derive(Clone, Copy)]
 pub(super) struct Mover<'a> {
     pub shape: &'a ShapeSlot,
     pub slot: u32,
+    pub piece: Piece<'a>,
     pub support: Support<'a>,
     pub path: Sweep,
     /// By how much the core is thinner than the shape.
@@ -98,23 +45,23 @@ pub(super) struct Mover<'a> {
 }
 
 impl<'a> Mover<'a> {
-    /// The shape of a body whose centre frame goes from `start` to `end`, turning by `turn` radians; `about_center` has it turn
-    /// about the centre of mass in any case. `None` for a mesh.
-    pub fn new((shape, slot): (&'a ShapeSlot, u32), [start, end]: &[Pose; 2], about_center: bool) -> Option<Self> {
-        let thickness = 0.5 * shape.geometry.inner_radius();
-        let Core { support: core, shift, middle } = Core::new(&shape.geometry)?;
+    /// A piece of a shape of a body whose centre frame goes from `start` to `end`; `about_center` has it turn about the centre
+    /// of mass in any case.
+    pub fn new(
+        (shape, slot): (&'a ShapeSlot, u32),
+        piece: &Piece<'a>,
+        [start, end]: &[Pose; 2],
+        about_center: bool,
+    ) -> Self {
+        let Core { support: core, shift, middle, depth: thickness } = piece.core;
         // A hull's frame may be far from the hull (a part of a tree is given about the tree's foot): it turns about its middle.
-        let on_body = &shape.from_center;
+        let on_body = &piece.place;
         let pivot = if about_center { on_body.inverse().position } else { shift + middle };
         let path = Sweep { start: start.mul(on_body), end: end.mul(on_body), pivot };
-        let to_core = Pose::from_position(shift);
-        let core_path = Sweep { start: path.start.mul(&to_core), end: path.end.mul(&to_core), pivot: pivot - shift };
-        let (support, path) = match Support::new(&shape.geometry) {
-            Some(support) => (support, path),
-            None => (Support::Sphere(Sphere::new(2.0 * thickness).ok()?), core_path),
-        };
+        let core_path = shifted(&path, shift);
         let bulge = bulge(&core, &core_path);
-        Some(Self { shape, slot, support, path, thickness, core, core_path, core_middle: middle, whole: false, bulge })
+        let (support, piece, core_middle) = (piece.surface, *piece, middle);
+        Self { shape, slot, piece, support, path, thickness, core, core_path, core_middle, whole: false, bulge }
     }
 
     /// The same, of which all counts rather than the core alone.
@@ -137,23 +84,14 @@ impl<'a> Mover<'a> {
         way.turn.length() > TURN_ABOUT_CENTER
     }
 
-    /// A core far thinner, with the core's path: what is left of a shape when its core has been pushed in.
-    pub fn spine(&self) -> Option<Support<'a>> {
-        Some(match &self.shape.geometry {
-            Shape::Capsule(s) => Support::Capsule(Capsule::new(s.half_length(), 0.2 * self.thickness).ok()?),
-            Shape::Cuboid(s) => {
-                Support::Cuboid(Cuboid::new(s.half_extents() - Vec3::splat(1.8 * self.thickness)).ok()?)
-            }
-            Shape::Hull(hull) => Support::Points(hull.spine()),
-            _ => return None,
-        })
+    /// A core far thinner, and its path: what is left of a shape when its core has been pushed in.
+    pub fn spine(&self) -> Option<(Support<'a>, Sweep)> {
+        self.piece.spine().map(|spine| (spine.support, shifted(&self.path, spine.shift)))
     }
 
     /// A small ball in the middle of the core, and its path.
     pub fn middle(&self) -> (Support<'a>, Sweep) {
-        let to_middle = Pose::from_position(self.core_middle);
-        let (start, end) = (self.core_path.start.mul(&to_middle), self.core_path.end.mul(&to_middle));
-        let path = Sweep { start, end, pivot: self.core_path.pivot - self.core_middle };
+        let path = shifted(&self.core_path, self.core_middle);
         (Sphere::new(0.1 * self.thickness).map_or(self.core, Support::Sphere), path)
     }
 
@@ -192,6 +130,12 @@ impl<'a> Mover<'a> {
             |path: &Sweep| Sweep { start: from.relative(&path.start), end: to.relative(&path.end), pivot: path.pivot };
         Self { path: seen(&self.path), core_path: seen(&self.core_path), ..*self }
     }
+}
+
+/// The path of a frame that sits at `shift` in the frame on a path.
+fn shifted(path: &Sweep, shift: Vec3) -> Sweep {
+    let shifted = Pose::from_position(shift);
+    Sweep { start: path.start.mul(&shifted), end: path.end.mul(&shifted), pivot: path.pivot - shift }
 }
 
 /// How far a point of a shape may bulge out of the chord of its arc. At radius `r` and a turn by `θ` that is

@@ -5,6 +5,7 @@
 //! the parts miss at the end (the spin of a body in free flight changes) is shared out evenly.
 
 use crate::math::{Pose, Real, Rotation, Vec3};
+use crate::world::shapes::ShapeSlot;
 
 /// Parts of a way turn by no more than this, radians.
 const LONGEST_TURN: Real = 0.8;
@@ -31,6 +32,11 @@ impl Way {
     /// A body that stays where it is.
     pub fn still(pose: Pose) -> Self {
         Self { start: pose, end: pose, turn: Vec3::ZERO, parts: 1 }
+    }
+
+    /// How far some point of a shape of the body goes at most.
+    pub fn length_at(&self, shape: &ShapeSlot) -> Real {
+        (self.end.position - self.start.position).length() + self.turn.length() * (shape.middle.length() + shape.reach)
     }
 
     /// The poses at the ends of a part.
