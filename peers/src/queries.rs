@@ -177,7 +177,8 @@ impl Random {
 }
 
 fn settings(count: usize) -> Vec<Setting> {
-    vec![boxes(count), mesh(count)]
+    let (mesh, field) = hills(count);
+    vec![boxes(count), mesh, field]
 }
 
 fn scene(bodies: Vec<Body>) -> Scene {
@@ -206,8 +207,8 @@ fn boxes(count: usize) -> Setting {
     Setting { name: "1,000 boxes", scene, lines: lines.collect() }
 }
 
-/// Hills of 100 × 100 m in 317 × 317 cells of two triangles: 200,978.
-fn mesh(count: usize) -> Setting {
+/// Hills of 100 × 100 m in 317 × 317 cells of two triangles, 200,978: as a mesh and as a height field, asked the same.
+fn hills(count: usize) -> (Setting, Setting) {
     const CELLS: usize = 317;
     let mut random = Random(11);
     let waves: Vec<(Real, Real, Real)> = (0..12)
@@ -220,28 +221,27 @@ fn mesh(count: usize) -> Setting {
         })
         .collect();
     let height = |x: Real, z: Real| waves.iter().map(|(a, b, h)| h * (a * x + b * z).sin()).sum::<Real>();
-    let place = |k: usize| (k as Real / CELLS as Real - 0.5) * 100.0;
-    let vertices: Vec<Vec3> = (0..(CELLS + 1) * (CELLS + 1))
-        .map(|k| {
-            let (x, z) = (place(k % (CELLS + 1)), place(k / (CELLS + 1)));
-            Vec3::new(x, height(x, z), z)
-        })
-        .collect();
-    let top = vertices.iter().fold(0.0_f32, |top, v| top.max(v.y));
-    let triangles = (0..CELLS * CELLS).flat_map(|k| {
-        let a = (k / CELLS * (CELLS + 1) + k % CELLS) as u32;
-        let b = a + CELLS as u32 + 1;
-        [[a, b, b + 1], [a, b + 1, a + 1]]
-    });
-    let mesh = Shape::mesh(vertices, triangles.collect()).expect("a mesh");
+    let corner = Vec3::new(-50.0, 0.0, -50.0);
+    let cell = 100.0 / CELLS as Real;
+    let place = |k: usize| k as Real * cell - 50.0;
+    let points = (0..(CELLS + 1) * (CELLS + 1)).map(|k| (place(k % (CELLS + 1)), place(k / (CELLS + 1))));
+    let heights: Vec<Real> = points.map(|(x, z)| height(x, z)).collect();
+    let top = heights.iter().fold(0.0_f32, |top, y| top.max(*y));
+    let field = Shape::height_field(heights, CELLS + 1, [cell, cell]).expect("a field");
+    let (vertices, triangles) = field.triangulate(0);
+    let mesh = Shape::mesh(vertices, triangles).expect("a mesh");
     let lines = (0..count).map(|_| {
         // Steep and flat ones, all from above.
         let from = Vec3::new(random.between(-45.0, 45.0), top + 1.0, random.between(-45.0, 45.0));
         let way = Vec3::new(random.between(-40.0, 40.0), -2.0 * top, random.between(-40.0, 40.0));
         (from, way)
     });
-    let lines = lines.collect();
-    Setting { name: "200k-triangle mesh", scene: scene(vec![fixed(BodyDefinition::fixed(), mesh)]), lines }
+    let lines: Vec<Line> = lines.collect();
+    let setting = |name, shape| {
+        let body = fixed(BodyDefinition::fixed().at(corner), shape);
+        Setting { name, scene: scene(vec![body]), lines: lines.clone() }
+    };
+    (setting("200k-triangle mesh", mesh), setting("200k-triangle field", field))
 }
 
 /// The fastest peer's rate for the same question.

@@ -2,38 +2,12 @@
 //!
 //! A binary of its own, since the counter sees all threads: one test, so that nothing else runs beside it.
 
+#[path = "common/counting.rs"]
+mod counting;
+
 use arbiter3d::math::Vec3;
 use arbiter3d::*;
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicUsize, Ordering};
-
-/// The system's allocator with a counter.
-struct Counting;
-
-static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
-
-// SAFETY: everything is passed on to the system's allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller's promises are those of `System`.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller's promises are those of `System`.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller's promises are those of `System`.
-        unsafe { System.realloc(pointer, layout, size) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
+use counting::allocations;
 
 /// Carries bare bodies on points at height zero and takes the arbiters away again: custom arbiters that come and go.
 #[derive(Default)]
@@ -120,14 +94,14 @@ fn a_world_in_steady_state_allocates_nothing_while_contacts_come_and_go() {
             world.step(1.0 / 60.0).unwrap();
         }
         let (mut begins, mut ends, mut asked) = (0, 0, 0);
-        let before = ALLOCATIONS.load(Ordering::Relaxed);
+        let before = allocations();
         for _ in 0..400 {
             world.step(1.0 / 60.0).unwrap();
             begins += world.begin_events().len();
             asked += world.hit_events().len().min(world.persist_events().len());
             ends += world.drain_end_events().count();
         }
-        let made = ALLOCATIONS.load(Ordering::Relaxed) - before;
+        let made = allocations() - before;
         assert!(begins > 300 && ends > 300, "contacts come and go: {begins} begins, {ends} ends");
         assert!(asked > 50 || events == ContactEvents::NONE, "{asked} steps with hits and contacts that go on");
         assert_eq!(made, 0, "allocations in 400 steps on {threads} threads, {events:?}");

@@ -3,7 +3,9 @@
 mod common;
 
 use arbiter3d::math::{Quat, Vec3};
-use arbiter3d::{BodyDefinition, BodyId, BodyKind, Error, Filter, Material, QueryFilter, ShapeDefinition, World};
+use arbiter3d::{
+    BodyDefinition, BodyId, BodyKind, Error, Filter, Material, QueryFilter, Shape, ShapeDefinition, World,
+};
 use arbiter3d::{EndReason, math::Aabb};
 use common::*;
 
@@ -379,4 +381,25 @@ fn given_mass_and_continuity_are_told() {
     world.body_mut(heavy).unwrap().set_mass(None).unwrap();
     world.body_mut(heavy).unwrap().set_continuous(true);
     assert_eq!(read(&world, heavy), (None, true));
+}
+
+/// Ten thousand bodies with one hull hold one hull, and those that go let go of it.
+#[test]
+fn bodies_share_their_geometry() {
+    let mut world = weightless();
+    let rock = icosahedron(0.5);
+    let Shape::Hull(hull) = &rock else { panic!("an icosahedron is a hull") };
+    let definition = ShapeDefinition::new(rock.clone());
+    let before = std::sync::Arc::strong_count(hull);
+    let bodies: Vec<BodyId> = (0..10_000)
+        .map(|k| {
+            let at = Vec3::new((k % 100) as f32, (k / 100) as f32, 0.0) * 2.0;
+            add(&mut world, &BodyDefinition::dynamic().at(at), &definition)
+        })
+        .collect();
+    assert_eq!(std::sync::Arc::strong_count(hull), before + 10_000);
+    for body in &bodies[..5_000] {
+        world.remove_body(*body).unwrap();
+    }
+    assert_eq!(std::sync::Arc::strong_count(hull), before + 5_000);
 }

@@ -303,6 +303,35 @@ fn low_ceilings_stop_it() {
     assert!(walk.at().y < 0.21 && walk.hero.velocity().y < 0.0);
 }
 
+/// A platform that bodies pass upwards: the character jumps up through it at the full height, lands and walks on it, falls off
+/// its end, and walks below it without knocking its head. An ordinary one stops the head.
+#[test]
+fn one_way_platforms_are_jumped_through() {
+    let mut walk = Walk::on_floor(Vec3::ZERO);
+    let platform = ShapeDefinition::new(cuboid(2.0, 0.1, 2.0)).at(Vec3::new(0.0, 1.9, 0.0));
+    walk.world.add_shape(BodyId::WORLD, &platform.one_way(Vec3::Y)).unwrap();
+    walk.walk(Vec3::ZERO, 0.1);
+    assert_near(walk.at().y, 0.0, 0.002, "on the floor, the head in the platform's way");
+    let speed = walk.hero.jump_speed(2.4);
+    assert!(walk.hero.jump(speed).unwrap());
+    let mut top = 0.0_f32;
+    for _ in 0..120 {
+        walk.step(Vec3::ZERO);
+        top = top.max(walk.at().y);
+    }
+    assert_near(top, 2.4, 0.02, "height of the jump");
+    assert!(walk.hero.is_on_ground());
+    assert_near(walk.at().y, 2.0, 0.002, "on the platform");
+    walk.walk(Vec3::X * 2.0, 0.5);
+    assert_near(walk.at().x, 1.0, 0.1, "walks on it");
+    assert_near(walk.at().y, 2.0, 0.002, "stays on it");
+    walk.walk(Vec3::X * 3.0, 2.0);
+    assert_near(walk.at().y, 0.0, 0.002, "down beside it");
+    walk.walk(Vec3::X * -3.0, 3.0);
+    assert!(walk.at().x < 0.0, "back below it");
+    assert_near(walk.at().y, 0.0, 0.002, "on the floor again");
+}
+
 /// A lift carries it up and down at its own speed; a platform that turns takes it round on a circle.
 #[test]
 fn platforms_carry_it() {

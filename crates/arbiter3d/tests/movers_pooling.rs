@@ -2,38 +2,12 @@
 //!
 //! A binary of its own, since the counter sees all threads: one test, so that nothing else runs beside it.
 
+#[path = "common/counting.rs"]
+mod counting;
+
 use arbiter3d::math::Vec3;
 use arbiter3d::*;
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicUsize, Ordering};
-
-/// The system's allocator with a counter.
-struct Counting;
-
-static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
-
-// SAFETY: everything is passed on to the system's allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller's promises are those of `System`.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller's promises are those of `System`.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-
-    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller's promises are those of `System`.
-        unsafe { System.realloc(pointer, layout, size) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
+use counting::allocations;
 
 #[test]
 fn vehicles_and_fluids_allocate_nothing_in_steady_steps() {
@@ -66,13 +40,13 @@ fn vehicles_and_fluids_allocate_nothing_in_steady_steps() {
     let mut pool = FluidVolume::new(pool).unwrap();
 
     let mut run = |steps: usize| {
-        let before = ALLOCATIONS.load(Ordering::Relaxed);
+        let before = allocations();
         for _ in 0..steps {
             car.update(&mut world, DT).unwrap();
             pool.update(&mut world, DT).unwrap();
             world.step(DT).unwrap();
         }
-        ALLOCATIONS.load(Ordering::Relaxed) - before
+        allocations() - before
     };
     run(400);
     assert_eq!(run(300), 0);

@@ -6,6 +6,8 @@ mod common;
 mod batch;
 #[path = "queries/casts.rs"]
 mod casts;
+#[path = "queries/fields.rs"]
+mod fields;
 #[path = "queries/nearest.rs"]
 mod nearest;
 #[path = "queries/watertight.rs"]

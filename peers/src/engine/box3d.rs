@@ -6,7 +6,7 @@ use super::{Ask, Engine, State, beyond_peers, rolling_resistance};
 use crate::queries::{BALL, BOX, tilt};
 use crate::scene::{Body, Scene};
 use arbiter3d::math::{Quat, Real, Rotation, Vec3};
-use arbiter3d::{BodyKind, CombineRule, ConvexHull, LockedAxes, Shape, ShapeDefinition, TriangleMesh, WorldSettings};
+use arbiter3d::{BodyKind, CombineRule, ConvexHull, HeightField, LockedAxes, Shape, ShapeDefinition, TriangleMesh, WorldSettings};
 use boxddd_sys::ffi;
 use std::collections::HashMap;
 use std::ffi::{CStr, c_char, c_int, c_void};
@@ -19,6 +19,7 @@ pub struct Box3d {
     bodies: Vec<Option<ffi::b3BodyId>>,
     hulls: HashMap<usize, *mut ffi::b3HullData>,
     meshes: HashMap<usize, *mut ffi::b3MeshData>,
+    fields: HashMap<usize, *mut ffi::b3HeightFieldData>,
     allow_sleep: bool,
     sleep_speed: Real,
     substeps: i32,
@@ -26,7 +27,7 @@ pub struct Box3d {
 
 /// Why Box3D cannot have this body, if it cannot.
 pub fn unsupported(body: &Body) -> Option<String> {
-    let mesh = |shape: &ShapeDefinition| matches!(shape.shape, Shape::Mesh(_));
+    let mesh = |shape: &ShapeDefinition| matches!(shape.shape, Shape::Mesh(_) | Shape::HeightField(_));
     let offset = |shape: &ShapeDefinition| shape.position != Vec3::ZERO || shape.rotation != Quat::IDENTITY;
     let mixes_otherwise = |shape: &ShapeDefinition| {
         let material = &shape.material;
@@ -99,6 +100,7 @@ impl Box3d {
             bodies: Vec::with_capacity(scene.bodies.len()),
             hulls: HashMap::new(),
             meshes: HashMap::new(),
+            fields: HashMap::new(),
             allow_sleep: settings.allow_sleep,
             sleep_speed,
             substeps: settings.substeps as i32,
@@ -151,7 +153,7 @@ impl Box3d {
         definition.updateBodyMass = updates_mass;
         let local = ffi::b3Transform { p: vec(shape.position), q: quat(shape.rotation) };
         let at = |y: Real| vec(shape.position + Rotation::from_quat(shape.rotation).rotate(Vec3::new(0.0, y, 0.0)));
-        // SAFETY: the body lives; Box3D copies all geometry but meshes, which live until `drop`.
+        // SAFETY: the body lives; Box3D copies all geometry but meshes and fields, which live until `drop`.
         unsafe {
             match &shape.shape {
                 Shape::Sphere(sphere) => {
@@ -180,6 +182,10 @@ impl Box3d {
                     let mesh = self.mesh(mesh);
                     ffi::b3CreateMeshShape(body, &definition, mesh, vec(Vec3::ONE));
                 }
+                Shape::HeightField(field) => {
+                    let field = self.field(field);
+                    ffi::b3CreateHeightFieldShape(body, &definition, field);
+                }
                 other => unreachable!("a shape that this program does not know: {other:?}"),
             }
         }
@@ -192,6 +198,27 @@ impl Box3d {
             unsafe { ffi::b3CreateHull(points.as_ptr(), points.len() as i32, points.len() as i32) }
         };
         *self.hulls.entry(Arc::as_ptr(hull) as usize).or_insert_with(build)
+    }
+
+    /// Heights become steps of 1/65535 of their range.
+    fn field(&mut self, field: &Arc<HeightField>) -> *const ffi::b3HeightFieldData {
+        let build = || {
+            let mut heights = field.heights().to_vec();
+            let [width, length] = field.cell_size();
+            let definition = ffi::b3HeightFieldDef {
+                heights: heights.as_mut_ptr(),
+                materialIndices: null_mut(),
+                scale: vec(Vec3::new(width, 1.0, length)),
+                countX: field.columns() as i32 + 1,
+                countZ: field.rows() as i32 + 1,
+                globalMinimumHeight: heights.iter().fold(Real::MAX, |low, y| low.min(*y)),
+                globalMaximumHeight: heights.iter().fold(-Real::MAX, |high, y| high.max(*y)),
+                clockwiseWinding: false,
+            };
+            // SAFETY: pointer and counts are those of the vector, which outlives the call and is copied.
+            unsafe { ffi::b3CreateHeightField(&definition) }
+        };
+        *self.fields.entry(Arc::as_ptr(field) as usize).or_insert_with(build)
     }
 
     fn mesh(&mut self, mesh: &Arc<TriangleMesh>) -> *const ffi::b3MeshData {
@@ -290,6 +317,7 @@ impl Drop for Box3d {
             ffi::b3DestroyWorld(self.world);
             self.hulls.values().for_each(|&hull| ffi::b3DestroyHull(hull));
             self.meshes.values().for_each(|&mesh| ffi::b3DestroyMesh(mesh));
+            self.fields.values().for_each(|&field| ffi::b3DestroyHeightField(field));
         }
     }
 }

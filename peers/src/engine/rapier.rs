@@ -7,6 +7,7 @@ use crate::scene::{Body, Scene};
 use arbiter3d::math::{Quat, Real, Vec3};
 use arbiter3d::{BodyKind, CombineRule, Shape, ShapeDefinition, WorldSettings};
 use rapier3d::parry::query::ShapeCastOptions;
+use rapier3d::parry::utils::Array2;
 use rapier3d::prelude::*;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -157,6 +158,13 @@ impl Rapier {
                 let shape = SharedShape::trimesh(vertices, mesh.triangles().to_vec()).map_err(|e| failed(&e))?;
                 Ok(self.shapes.entry(key).or_insert(shape).clone())
             }
+            Shape::HeightField(field) => {
+                // Listed column by column there, rows along z.
+                let (rows, columns) = (field.rows() + 1, field.columns() + 1);
+                let heights = (0..columns * rows).map(|k| field.heights()[k % rows * columns + k / rows]);
+                let heights = Array2::new(rows, columns, heights.collect());
+                Ok(SharedShape::heightfield(heights, vec(shape.local_aabb().half_extents() * 2.0).with_y(1.0)))
+            }
             other => Err(format!("a shape that this program does not know: {other:?}")),
         }
     }
@@ -165,8 +173,15 @@ impl Rapier {
         let group = |bits: u64| Group::from_bits_truncate(bits as u32);
         let filter =
             InteractionGroups::new(group(shape.filter.category), group(shape.filter.mask), InteractionTestMode::And);
+        // A height field lies about its middle there.
+        let middle = if matches!(shape.shape, Shape::HeightField(_)) {
+            shape.shape.local_aabb().center() * Vec3::new(1.0, 0.0, 1.0)
+        } else {
+            Vec3::ZERO
+        };
+        let position = shape.position + arbiter3d::math::Rotation::from_quat(shape.rotation).rotate(middle);
         Ok(ColliderBuilder::new(self.geometry(&shape.shape)?)
-            .position(pose(shape.position, shape.rotation))
+            .position(pose(position, shape.rotation))
             .density(shape.density)
             .friction(shape.material.friction)
             .friction_combine_rule(rule(shape.material.friction_combine))

@@ -12,6 +12,8 @@
 //! - [`ShapeMover::probe_ground`]: what is below, and whether one can stand on it.
 //! - [`ShapeMover::step_up`]: up, ahead and down on something higher.
 //!
+//! A one-way platform is in its way only where a question starts above it.
+//!
 //! The way of working is that of Quake's player code and of the movers of Box3D, with an exact solver of planes.
 
 use super::planes::{PlaneLimit, solve_planes};
@@ -20,7 +22,7 @@ use crate::id::{BodyId, ShapeId};
 use crate::math::{Pose, Real, Rotation, Vec3, max, min, normalize_or};
 use crate::query::ShapeCast;
 use crate::shape::Shape;
-use crate::world::{CastHit, Material, QueryFilter, World};
+use crate::world::{CastHit, Material, QueryFilter, ShapeRef, World, stops};
 
 /// Rounds of a slide. Each ends at a new obstacle; three make a corner.
 const ROUNDS: usize = 6;
@@ -138,6 +140,27 @@ impl<'a> ShapeMover<'a> {
         -self.shape.local_aabb().min.y
     }
 
+    /// Whether a shape that the filter lets through is in the way of the mover at a position.
+    fn sees(&self, pose: &Pose, shape: &ShapeRef<'_>) -> bool {
+        self.filter.predicate.is_none_or(|accepts| accepts(shape)) && stops(shape, (self.shape, pose))
+    }
+
+    /// Where the shape first meets something on a way from a position.
+    fn cast(&self, world: &World, position: Vec3, way: Vec3, ignored: &[ShapeId]) -> Result<Option<CastHit>, Error> {
+        let start = self.pose(position);
+        let sees = |shape: &ShapeRef<'_>| !ignored.contains(&shape.id()) && self.sees(&start, shape);
+        let filter = QueryFilter { predicate: Some(&sees), ..self.filter };
+        world.cast_shape(&ShapeCast::along(self.shape, start, way), &filter)
+    }
+
+    /// Whether a ray first meets something that can be walked on.
+    fn is_walkable(&self, world: &World, position: Vec3, (from, way): (Vec3, Vec3)) -> Result<bool, Error> {
+        let pose = self.pose(position);
+        let sees = |shape: &ShapeRef<'_>| self.sees(&pose, shape);
+        let hit = world.cast_ray(from, way, 1.0, &QueryFilter { predicate: Some(&sees), ..self.filter })?;
+        Ok(hit.is_some_and(|hit| hit.normal.dot(self.up) >= self.walkable_cosine))
+    }
+
     fn check(&self, position: Vec3) -> Result<(), Error> {
         finite_vec("position of the mover", position)?;
         in_range("skin", self.skin, 1e-6, 1e3)?;
@@ -157,7 +180,10 @@ impl<'a> ShapeMover<'a> {
         planes: &mut Vec<ContactPlane>,
     ) -> Result<(), Error> {
         self.check(position)?;
-        for contacts in world.collide_shape(self.shape, &self.pose(position), margin, &self.filter)? {
+        let pose = self.pose(position);
+        let sees = |shape: &ShapeRef<'_>| self.sees(&pose, shape);
+        let filter = QueryFilter { predicate: Some(&sees), ..self.filter };
+        for contacts in world.collide_shape(self.shape, &pose, margin, &filter)? {
             let (body, shape) = (contacts.body, contacts.shape);
             planes.extend(contacts.manifold.points().iter().map(|point| ContactPlane {
                 normal: point.normal,
@@ -232,15 +258,11 @@ impl<'a> ShapeMover<'a> {
     ) -> Result<(Vec3, Option<CastHit>), Error> {
         let length = way.length();
         let direction = way / length;
-        let mut ignored: Vec<ShapeId> = planes.iter().filter(|p| p.separation <= 0.0).map(|p| p.shape).collect();
-        let overlaps = !ignored.is_empty();
-        ignored.extend_from_slice(self.filter.exclude_shapes);
-        let filter = QueryFilter { exclude_shapes: &ignored, ..self.filter };
-        let length = if overlaps { min(length, self.skin) } else { length };
+        let ignored: Vec<ShapeId> = planes.iter().filter(|p| p.separation <= 0.0).map(|p| p.shape).collect();
+        let length = if !ignored.is_empty() { min(length, self.skin) } else { length };
         // Look a little farther than the way, so that the skin is kept at its end too.
         let reach = direction * (length + 2.0 * self.skin);
-        let cast = ShapeCast::along(self.shape, self.pose(position), reach);
-        let Some(hit) = world.cast_shape(&cast, &filter)? else { return Ok((direction * length, None)) };
+        let Some(hit) = self.cast(world, position, reach, &ignored)? else { return Ok((direction * length, None)) };
         let approach = max(-direction.dot(hit.normal), 0.05);
         let free = hit.fraction * (length + 2.0 * self.skin) - self.skin / approach;
         if free >= length {
@@ -300,8 +322,7 @@ impl<'a> ShapeMover<'a> {
         }
         // On a slant the skin is longer from top to bottom.
         let length = reach + SLANT * self.skin;
-        let cast = ShapeCast::along(self.shape, self.pose(position), self.up * -length);
-        let Some(hit) = world.cast_shape(&cast, &self.filter)? else { return Ok(None) };
+        let Some(hit) = self.cast(world, position, self.up * -length, &[])? else { return Ok(None) };
         let slant = min(1.0 / max(hit.normal.dot(self.up), 1e-3), SLANT);
         let distance = hit.fraction * length - (self.skin + hit.depth) * slant;
         if distance > reach {
@@ -340,8 +361,7 @@ impl<'a> ShapeMover<'a> {
     /// tread by more than a step.
     fn stands_over(&self, world: &World, position: Vec3, reach: Real) -> Result<bool, Error> {
         let down = self.up * -(self.depth_of_foot() + self.skin + 1.5 * reach);
-        let hit = world.cast_ray(position, down, 1.0, &self.filter)?;
-        Ok(hit.is_some_and(|hit| hit.normal.dot(self.up) >= self.walkable_cosine))
+        self.is_walkable(world, position, (position, down))
     }
 
     /// Tries to go by a level `displacement` over something up to `height` (metres) high: up, ahead, and down on it.
@@ -366,8 +386,7 @@ impl<'a> ShapeMover<'a> {
         // The slide may have changed the height on a slope.
         let fall = max((ahead - position).dot(self.up), 0.0);
         let length = fall + SLANT * self.skin;
-        let cast = ShapeCast::along(self.shape, self.pose(ahead), self.up * -length);
-        let Some(hit) = world.cast_shape(&cast, &self.filter)? else { return Ok(None) };
+        let Some(hit) = self.cast(world, ahead, self.up * -length, &[])? else { return Ok(None) };
         let slant = min(1.0 / max(hit.normal.dot(self.up), 1e-3), SLANT);
         let landing = ahead - self.up * max(hit.fraction * length - self.skin * slant, 0.0);
         let landing = self.raised(world, landing)?;
@@ -380,7 +399,7 @@ impl<'a> ShapeMover<'a> {
         for plane in &planes {
             let rise = plane.normal.dot(self.up);
             let low = rise > 0.05 && plane.point.dot(self.up) <= highest + 0.1 * self.skin;
-            if low && (rise >= self.walkable_cosine || self.top_is_walkable(world, plane.point, ahead)?) {
+            if low && (rise >= self.walkable_cosine || self.top_is_walkable(world, landing, (plane.point, ahead))?) {
                 return Ok(Some(landing));
             }
         }
@@ -403,9 +422,8 @@ impl<'a> ShapeMover<'a> {
     }
 
     /// Whether the surface just behind an edge can be walked on.
-    fn top_is_walkable(&self, world: &World, edge: Vec3, ahead: Vec3) -> Result<bool, Error> {
+    fn top_is_walkable(&self, world: &World, position: Vec3, (edge, ahead): (Vec3, Vec3)) -> Result<bool, Error> {
         let above = edge + ahead * self.skin + self.up * (2.0 * self.skin);
-        let hit = world.cast_ray(above, self.up * (-4.0 * self.skin), 1.0, &self.filter)?;
-        Ok(hit.is_some_and(|hit| hit.normal.dot(self.up) >= self.walkable_cosine))
+        self.is_walkable(world, position, (above, self.up * (-4.0 * self.skin)))
     }
 }

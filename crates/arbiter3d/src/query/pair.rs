@@ -156,10 +156,14 @@ fn part_distance(part1: &Part, support2: &Support, placed: &Pose) -> Option<Sepa
     Some(Separation { distance, child: part1.child, triangle: part1.triangle })
 }
 
-/// The point at which two shapes overlap most, in the frame of shape 1.
+/// What touches may be apart by rounding: by this share of the smaller shape's reach at most.
+const TOUCHING: Real = 1e-4;
+
+/// The point at which two shapes that overlap, or touch but for rounding, overlap most, in the frame of shape 1.
 pub(crate) fn deepest_contact(shape1: &Shape, shape2: &Shape, pose: &Pose) -> Option<ManifoldPoint> {
     let mut manifold = Manifold::EMPTY;
-    collide(shape1, shape2, pose, 0.0, &mut PairCache::default(), &mut manifold);
+    let margin = TOUCHING * crate::math::min(shape1.reach(), shape2.reach());
+    collide(shape1, shape2, pose, margin, &mut PairCache::default(), &mut manifold);
     let mut deepest: Option<ManifoldPoint> = None;
     for point in manifold.points() {
         if deepest.is_none_or(|other| point.separation < other.separation) {

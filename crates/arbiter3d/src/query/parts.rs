@@ -7,9 +7,7 @@
 
 use crate::math::{Aabb, Pose, Real, Vec3, abs3, max, max3, min, min3};
 use crate::narrow_phase::Support;
-use crate::shape::{
-    Compound, Cuboid, Descent, Geometry, HeightField, LEAF, MeshSides, Shape, Slabs, TriangleMesh, box_distances,
-};
+use crate::shape::{Compound, Cuboid, Descent, Geometry, LEAF, MeshSides, Shape, Slabs, Surface, box_distances};
 use crate::simd::{LaneVec3, Lanes};
 
 /// A convex part of a shape.
@@ -181,8 +179,8 @@ impl Path {
 /// one.
 pub(crate) fn visit_parts<'a>(shape: &'a Shape, region: &Region, mut visit: impl FnMut(&Part<'a>, Real) -> Real) {
     match shape {
-        Shape::Mesh(mesh) => visit_triangles(mesh, region, &mut visit),
-        Shape::HeightField(field) => visit_field(field, region, &mut visit),
+        Shape::Mesh(mesh) => visit_triangles(Surface::Mesh(mesh), region, &mut visit),
+        Shape::HeightField(field) => visit_triangles(Surface::Field(field), region, &mut visit),
         Shape::HalfSpace(_) => visit_half_space(region, &mut visit),
         Shape::Compound(compound) => visit_children(compound, region, &mut visit),
         Shape::Voxels(grid) => {
@@ -237,44 +235,33 @@ fn visit_half_space<'a>(region: &Region, visit: &mut impl FnMut(&Part<'a>, Real)
 /// Half extent of the block that stands for a half-space where a region is endless, metres.
 const LARGEST_BLOCK: Real = 1e7;
 
-fn visit_triangles<'a>(mesh: &'a TriangleMesh, region: &Region, visit: &mut impl FnMut(&Part<'a>, Real) -> Real) {
+fn visit_triangles<'a>(surface: Surface<'a>, region: &Region, visit: &mut impl FnMut(&Part<'a>, Real) -> Real) {
     match region {
         Region::Box(aabb) => {
             let mut limit = region.limit();
-            mesh.for_each_facet(aabb, |index| {
+            surface.for_each_facet(aabb, |index| {
                 if limit >= 0.0 {
-                    limit = visit(&triangle(mesh, index), limit);
+                    limit = visit(&triangle(surface, index), limit);
                 }
             });
         }
         Region::Path(path) => {
-            let slabs = Slabs::of_box(path.center, path.half, path.displacement, &mesh.local_aabb());
-            mesh.descend(path.limit, &mut Along { mesh, path, slabs, visit });
+            let slabs = Slabs::of_box(path.center, path.half, path.displacement, &surface.local_aabb());
+            surface.descend(path.limit, &mut Along { surface, path, slabs, visit });
         }
         Region::Near { aabb, limit } => {
-            mesh.descend(*limit * *limit, &mut Around { mesh, aabb, visit });
+            surface.descend(*limit * *limit * ROUNDED, &mut Around { surface, aabb, visit });
         }
     }
 }
 
-fn visit_field<'a>(field: &'a HeightField, region: &Region, visit: &mut impl FnMut(&Part<'a>, Real) -> Real) {
-    let mut limit = region.limit();
-    field.for_each_facet(&region.bounds(), |index| {
-        if limit >= 0.0 {
-            let triangle = Some(index as u32);
-            let part = Part { triangle, one_sided: true, ..Part::whole(Support::Triangle(field.corners(index))) };
-            limit = visit(&part, limit);
-        }
-    });
-}
-
-fn triangle(mesh: &TriangleMesh, index: usize) -> Part<'_> {
+fn triangle(surface: Surface<'_>, index: usize) -> Part<'_> {
     Part {
-        support: Support::Triangle(mesh.corners(index)),
+        support: Support::Triangle(surface.corners(index)),
         pose: None,
         child: None,
-        triangle: Some(mesh.id(index)),
-        one_sided: mesh.sides() == MeshSides::One,
+        triangle: Some(surface.id(index)),
+        one_sided: surface.sides() == MeshSides::One,
     }
 }
 
@@ -294,7 +281,7 @@ fn near_lanes<W: Lanes<LEAF>>(distances: W, count: usize) -> u32 {
 
 /// Triangles that a box meets on its way.
 struct Along<'a, 'v, F> {
-    mesh: &'a TriangleMesh,
+    surface: Surface<'a>,
     path: &'v Path,
     slabs: Slabs,
     visit: &'v mut F,
@@ -308,14 +295,14 @@ impl<'a, F: FnMut(&Part<'a>, Real) -> Real> Descent for Along<'a, '_, F> {
 
     #[inline(always)]
     fn leaf<W: Lanes<LEAF>>(&mut self, first: usize, count: usize, limit: Real) -> Real {
-        let corners = self.mesh.corners_of_leaf::<W>(first, count);
+        let corners = self.surface.corners_of_leaf::<W>(first, count);
         let (low, high) = boxes(&corners);
         let times = self.slabs.pass(&low, &high, limit);
-        let one_sided = self.mesh.sides() == MeshSides::One;
+        let one_sided = self.surface.sides() == MeshSides::One;
         let distances =
             self.path.solid.through_planes(&corners, times, (self.path.displacement, self.slabs.slack()), one_sided);
         let lanes = near_lanes(distances, count);
-        visit_near(self.mesh, first, (lanes, distances.to_array()), limit, |part, limit| (self.visit)(part, limit))
+        visit_near(self.surface, first, (lanes, distances.to_array()), limit, |part, limit| (self.visit)(part, limit))
     }
 }
 
@@ -356,9 +343,12 @@ impl Solid {
     }
 }
 
+/// What is just as near counts as well, the first in the list of all: squares of distances are off by less than this.
+const ROUNDED: Real = 1.0 + 1e-6;
+
 /// Triangles near a box.
 struct Around<'a, 'v, F> {
-    mesh: &'a TriangleMesh,
+    surface: Surface<'a>,
     aabb: &'v Aabb,
     visit: &'v mut F,
 }
@@ -371,12 +361,12 @@ impl<'a, F: FnMut(&Part<'a>, Real) -> Real> Descent for Around<'a, '_, F> {
 
     #[inline(always)]
     fn leaf<W: Lanes<LEAF>>(&mut self, first: usize, count: usize, limit: Real) -> Real {
-        let (low, high) = boxes(&self.mesh.corners_of_leaf::<W>(first, count));
+        let (low, high) = boxes(&self.surface.corners_of_leaf::<W>(first, count));
         let distances = box_distances(self.aabb, &low, &high, limit);
         let lanes = near_lanes(distances, count);
-        visit_near(self.mesh, first, (lanes, distances.to_array()), limit, |part, limit| {
+        visit_near(self.surface, first, (lanes, distances.to_array()), limit, |part, limit| {
             let limit = (self.visit)(part, limit.sqrt());
-            if limit < 0.0 { limit } else { limit * limit }
+            if limit < 0.0 { limit } else { limit * limit * ROUNDED }
         })
     }
 }
@@ -384,7 +374,7 @@ impl<'a, F: FnMut(&Part<'a>, Real) -> Real> Descent for Around<'a, '_, F> {
 /// Visits the triangles of some lanes of a leaf, nearest first, and returns the last limit.
 #[inline]
 fn visit_near<'a>(
-    mesh: &'a TriangleMesh,
+    surface: Surface<'a>,
     first: usize,
     (mut lanes, distances): (u32, [Real; LEAF]),
     limit: Real,
@@ -405,7 +395,7 @@ fn visit_near<'a>(
         if distances[nearest] > limit {
             break;
         }
-        limit = crate::math::min(visit(&triangle(mesh, first + nearest), limit), limit);
+        limit = crate::math::min(visit(&triangle(surface, first + nearest), limit), limit);
     }
     limit
 }

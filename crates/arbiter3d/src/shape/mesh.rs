@@ -1,18 +1,14 @@
 //! Triangle meshes: validation, the tree over the triangles, their neighbours, rays.
 //!
-//! A mesh holds the user's vertices and triangles as given, 16 bytes a triangle about its neighbourhood in the order of the
+//! A mesh holds the user's vertices as given, the triangles and 16 bytes about the neighbourhood of each in the order of the
 //! tree, and the tree: 40 bytes a triangle in all. Corners and normals are made from them as they are needed. Every number
 //! reported to the user is a position in the user's list.
-//!
-//! Rays use the watertight test of Woop, Benthin and Wald ("Watertight Ray/Triangle Intersection", 2013) with its edge
-//! functions in double precision: both sides of a shared edge compute the same number with opposite sign, so a ray
-//! cannot slip through between them. The triangles of a leaf are first looked at side by side in single precision with a bound
-//! on its rounding, which passes on all that the exact test might hit.
 
 use super::geometry::Geometry;
 use super::mesh_edges::{Adjacency, Surface, Surroundings};
 use super::mesh_interior::Interior;
-use super::mesh_tree::{Descent, LEAF, Leaves, MeshTree, Slabs};
+use super::mesh_tree::{Descent, LEAF, Leaves, MeshTree};
+use super::surface_ray::first_triangle;
 use super::{MassProperties, ShapeError};
 use crate::math::{Aabb, Real, Vec3, max3, min3};
 use crate::query::{self, ShapeHit};
@@ -93,11 +89,13 @@ impl Facet {
 pub struct TriangleMesh {
     /// The user's and one more, so that four numbers can be read wherever a vertex starts.
     vertices: Vec<Vec3>,
+    /// In the order of the tree, as the next.
     triangles: Vec<[u32; 3]>,
+    surroundings: Vec<Surroundings>,
     sides: MeshSides,
     tree: MeshTree,
-    /// In the order of the tree.
-    surroundings: Vec<Surroundings>,
+    /// In the user's order, once they are asked for.
+    given: OnceLock<Vec<[u32; 3]>>,
     /// Of each of the user's triangles; empty if all are zero.
     materials: Vec<u8>,
     open_edges: usize,
@@ -160,7 +158,7 @@ impl TriangleMesh {
         Ok((Self::build(vertices, triangles, sides, &normals), left_out))
     }
 
-    fn build(mut vertices: Vec<Vec3>, mut triangles: Vec<[u32; 3]>, sides: MeshSides, normals: &[Vec3]) -> Self {
+    fn build(mut vertices: Vec<Vec3>, triangles: Vec<[u32; 3]>, sides: MeshSides, normals: &[Vec3]) -> Self {
         let surface = Surface { vertices: &vertices, triangles: &triangles, normals };
         let boxes = triangles.iter().map(|t| {
             let [a, b, c] = t.map(|i| vertices[i as usize]);
@@ -176,13 +174,13 @@ impl TriangleMesh {
         vertices.reserve_exact(1);
         vertices.push(Vec3::ZERO);
         vertices.shrink_to_fit();
-        triangles.shrink_to_fit();
         Self {
             vertices,
-            triangles,
+            triangles: order.iter().map(|&id| triangles[id as usize]).collect(),
+            surroundings,
             sides,
             tree,
-            surroundings,
+            given: OnceLock::new(),
             materials: Vec::new(),
             open_edges,
             interior: OnceLock::new(),
@@ -215,10 +213,16 @@ impl TriangleMesh {
         &self.vertices[..self.vertices.len() - 1]
     }
 
-    /// Triangles as given: three indices into the vertices.
+    /// Triangles as given: three indices into the vertices. The first call makes the list, 12 bytes a triangle.
     #[must_use]
     pub fn triangles(&self) -> &[[u32; 3]] {
-        &self.triangles
+        self.given.get_or_init(|| {
+            let mut given = vec![[0; 3]; self.triangles.len()];
+            for (triangle, around) in self.triangles.iter().zip(&self.surroundings) {
+                given[around.id as usize] = *triangle;
+            }
+            given
+        })
     }
 
     /// Edges that no triangle closes, or along which two triangles wind the same way; corners count as one where their
@@ -249,26 +253,12 @@ impl TriangleMesh {
     /// from the front only. Of triangles met at the same distance the one with the smallest number is reported.
     #[must_use]
     pub fn cast_ray(&self, origin: Vec3, direction: Vec3, limit: Real) -> Option<MeshRayHit> {
-        self.first_hit(origin, direction, limit, self.sides).map(|(distance, index, back)| {
+        let found = first_triangle(super::Surface::Mesh(self), (origin, direction, limit), self.sides);
+        found.map(|(distance, index, back)| {
             let normal = self.facet(index).normal();
             let normal = if back { -normal } else { normal };
             MeshRayHit { distance, normal, triangle: self.surroundings[index].id }
         })
-    }
-
-    /// How far away a ray meets which triangle (its internal number), and whether from behind.
-    pub(super) fn first_hit(
-        &self,
-        origin: Vec3,
-        direction: Vec3,
-        limit: Real,
-        sides: MeshSides,
-    ) -> Option<(Real, usize, bool)> {
-        let ray = Ray::new(origin, direction, &self.tree.around())?;
-        let slabs = Slabs::of_point(origin, direction);
-        let mut search = RaySearch { mesh: self, ray, slabs, sides, best: None };
-        self.tree.descend(limit, &mut search);
-        search.best
     }
 
     /// Shows the triangles to a search that wants the nearest first.
@@ -306,7 +296,7 @@ impl TriangleMesh {
     /// Corners of a triangle by its internal number.
     #[inline(always)]
     pub(crate) fn corners(&self, index: usize) -> [Vec3; 3] {
-        let [a, b, c] = self.triangles[self.surroundings[index].id as usize];
+        let [a, b, c] = self.triangles[index];
         [self.vertices[a as usize], self.vertices[b as usize], self.vertices[c as usize]]
     }
 
@@ -320,22 +310,14 @@ impl TriangleMesh {
     /// The triangles of a leaf side by side; lanes past the last hold that one again.
     #[inline(always)]
     pub(crate) fn corners_of_leaf<W: Lanes<LEAF>>(&self, first: usize, count: usize) -> [LaneVec3<W>; 3] {
-        let around = &self.surroundings[first..first + count];
-        let mut ids = [0; LEAF];
-        if let Ok(full) = <&[Surroundings; LEAF]>::try_from(around) {
-            for (id, around) in ids.iter_mut().zip(full) {
-                *id = around.id as usize;
-            }
+        let own = &self.triangles[first..first + count];
+        let mut triangles = [[0; 3]; LEAF];
+        if let Ok(full) = <&[[u32; 3]; LEAF]>::try_from(own) {
+            triangles = *full;
         } else {
-            for (lane, id) in ids.iter_mut().enumerate() {
-                *id = around[lane.min(count - 1)].id as usize;
+            for (lane, triangle) in triangles.iter_mut().enumerate() {
+                *triangle = own[lane.min(count - 1)];
             }
-        }
-        let mut triangles = [&[0; 3]; LEAF];
-        for (triangle, &id) in triangles.iter_mut().zip(&ids) {
-            debug_assert!(id < self.triangles.len());
-            // SAFETY: the ids are the numbers of the triangles in another order, and neither list changes.
-            *triangle = unsafe { self.triangles.get_unchecked(id) };
         }
         let mut corners = [LaneVec3::ZERO; 3];
         for (i, corner) in corners.iter_mut().enumerate() {
@@ -460,127 +442,6 @@ fn normal_of([a, b, c]: [Vec3; 3]) -> Option<Vec3> {
         larger((b - a).length_squared(), larger((c - b).length_squared(), larger((a - c).length_squared(), 0.0)));
     let length = cross.length();
     (length > 1e-6 * longest).then(|| (cross * (1.0 / length)).as_vec3())
-}
-
-/// A ray in the frame of the watertight test: sheared so that it runs along its longest axis.
-pub(super) struct Ray {
-    origin: Vec3,
-    axes: [usize; 3],
-    shear: [f64; 3],
-    /// What rounding to single precision does to a sheared coordinate at most, twice over.
-    rounding: Real,
-}
-
-impl Ray {
-    /// A ray for triangles in the box `around`.
-    pub(super) fn new(origin: Vec3, direction: Vec3, around: &Aabb) -> Option<Self> {
-        let size = crate::math::abs3(direction);
-        let z = if size.x >= size.y && size.x >= size.z { 0 } else { 1 + usize::from(size.z > size.y) };
-        if !(size[z] > 0.0 && direction.is_finite() && origin.is_finite()) {
-            return None;
-        }
-        let (x, y) = ((z + 1) % 3, (z + 2) % 3);
-        let d = direction.as_dvec3();
-        let shear = [d[x] / d[z], d[y] / d[z], 1.0 / d[z]];
-        // A difference, a factor of at most 1 and its product, and another difference of up to twice that: 5 half-steps.
-        let rounding = 6e-7 * around.farthest_from(origin).max_element();
-        Some(Self { origin, axes: [x, y, z], shear, rounding })
-    }
-
-    /// The triangles that [`Ray::hit`] may hit, a bit each: those whose edge functions are of one sign as far as single
-    /// precision can tell, and that do not turn away a ray from behind for sure.
-    #[inline(always)]
-    fn may_hit<W: Lanes<LEAF>>(&self, corners: &[LaneVec3<W>; 3], sides: MeshSides) -> u32 {
-        let [x, y, z] = self.axes;
-        let (shear_x, shear_y) = (W::splat(self.shear[0] as Real), W::splat(self.shear[1] as Real));
-        let origin = LaneVec3::<W>::splat(self.origin);
-        let mut sheared = [[W::ZERO; 2]; 3];
-        let mut extent = W::ZERO;
-        for i in 0..3 {
-            let p = (corners[i] - origin).columns();
-            sheared[i] = [p[x] - shear_x * p[z], p[y] - shear_y * p[z]];
-            extent = sheared[i][0].abs().max(sheared[i][1].abs()).max(extent);
-        }
-        let [a, b, c] = sheared;
-        let u = c[0] * b[1] - c[1] * b[0];
-        let v = a[0] * c[1] - a[1] * c[0];
-        let w = b[0] * a[1] - b[1] * a[0];
-        // Each of the four factors is off by `rounding`, each product and the difference by half-steps of `extent²`.
-        let rounding = W::splat(self.rounding);
-        let error = W::splat(4.0) * rounding * (extent + rounding) + W::splat(5e-7) * extent * extent;
-        let (least, most) = (u.min(v).min(w), u.max(v).max(w));
-        let one = W::splat(1.0);
-        let mixed = most.if_above(error, (-least).if_above(error, one, W::ZERO), W::ZERO);
-        let mut may = one - mixed;
-        if sides == MeshSides::One {
-            let front = if self.shear[2] < 0.0 { -(u + v + w) } else { u + v + w };
-            may = (-front).if_above(W::splat(4.0) * error, W::ZERO, may);
-        }
-        may.positive()
-    }
-
-    /// How far along the ray a triangle is met, and whether from behind.
-    pub(super) fn hit(&self, corners: &[Vec3; 3], sides: MeshSides) -> Option<(Real, bool)> {
-        let origin = self.origin.as_dvec3();
-        let [x, y, z] = self.axes;
-        let sheared = corners.map(|corner| {
-            let p = corner.as_dvec3() - origin;
-            [p[x] - self.shear[0] * p[z], p[y] - self.shear[1] * p[z], self.shear[2] * p[z]]
-        });
-        let [a, b, c] = sheared;
-        let u = c[0] * b[1] - c[1] * b[0];
-        let v = a[0] * c[1] - a[1] * c[0];
-        let w = b[0] * a[1] - b[1] * a[0];
-        if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
-            return None;
-        }
-        let sum = u + v + w;
-        if sum == 0.0 {
-            return None;
-        }
-        let distance = ((u * a[2] + v * b[2] + w * c[2]) / sum) as Real;
-        // The sum is minus twice the area as seen along the axis, which the ray may run down.
-        let back = (sum < 0.0) != (self.shear[2] < 0.0);
-        (distance >= 0.0 && !(back && sides == MeshSides::One)).then_some((distance, back))
-    }
-}
-
-/// The first triangle along a ray.
-struct RaySearch<'a> {
-    mesh: &'a TriangleMesh,
-    ray: Ray,
-    slabs: Slabs,
-    sides: MeshSides,
-    /// Distance, internal number, whether hit from behind.
-    best: Option<(Real, usize, bool)>,
-}
-
-impl Descent for RaySearch<'_> {
-    #[inline(always)]
-    fn distances<W: Lanes<LEAF>>(&self, low: &LaneVec3<W>, high: &LaneVec3<W>, limit: Real) -> W {
-        self.slabs.enter(low, high, limit)
-    }
-
-    #[inline(always)]
-    fn leaf<W: Lanes<LEAF>>(&mut self, first: usize, count: usize, limit: Real) -> Real {
-        let corners = self.mesh.corners_of_leaf::<W>(first, count);
-        let mut bits = self.ray.may_hit(&corners, self.sides) & ((1 << count) - 1);
-        let mut limit = limit;
-        while bits != 0 {
-            let index = first + bits.trailing_zeros() as usize % LEAF;
-            bits &= bits - 1;
-            let Some((distance, back)) = self.ray.hit(&self.mesh.corners(index), self.sides) else { continue };
-            let first = match self.best {
-                Some((best, other, _)) => (distance, self.mesh.id(index)) < (best, self.mesh.id(other)),
-                None => true,
-            };
-            if distance <= limit && first {
-                limit = distance;
-                self.best = Some((distance, index, back));
-            }
-        }
-        limit
-    }
 }
 
 #[cfg(test)]

@@ -11,6 +11,8 @@ use super::MassProperties;
 use super::mass::Moments;
 use super::mesh::{MeshSides, TriangleMesh};
 use super::mesh_tree::{Descent, LEAF, box_distances};
+use super::surface::Surface;
+use super::surface_ray::first_triangle;
 use crate::math::{Aabb, Real, Vec3, clamp, min};
 use crate::simd::{LaneVec3, Lanes};
 
@@ -69,7 +71,7 @@ fn inner_ball(mesh: &TriangleMesh) -> (Vec3, Real) {
 /// The middle between what is before and behind a point that is inside; `None` if it is not.
 fn middle(mesh: &TriangleMesh, point: Vec3, axis: Vec3, size: Real) -> Option<Vec3> {
     let inside = |direction: Vec3| {
-        let (distance, _, back) = mesh.first_hit(point, direction, 4.0 * size, MeshSides::Two)?;
+        let (distance, _, back) = first_triangle(Surface::Mesh(mesh), (point, direction, 4.0 * size), MeshSides::Two)?;
         back.then_some(distance)
     };
     let (ahead, behind) = (inside(axis)?, inside(-axis).unwrap_or(0.0));

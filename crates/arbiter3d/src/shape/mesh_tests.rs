@@ -43,7 +43,7 @@ fn queries_and_rays_match_brute_force() {
             assert_eq!(found, expected);
 
             let (origin, direction) = (random.vector() * 12.0, random.vector());
-            let ray = Ray::new(origin, direction, &mesh.local_aabb()).unwrap();
+            let ray = super::super::surface_ray::SharpRay::new(origin, direction, &mesh.local_aabb()).unwrap();
             let hits = (0..500).filter_map(|i| {
                 let (distance, back) = ray.hit(&mesh.corners(i), sides)?;
                 let normal = mesh.facet(i).normal();

@@ -36,6 +36,7 @@ mod point_cloud;
 mod rounded;
 mod sphere;
 mod surface;
+mod surface_ray;
 mod tapered_capsule;
 mod transformed;
 mod triangle;

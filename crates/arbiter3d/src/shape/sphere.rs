@@ -18,6 +18,9 @@ pub struct Sphere {
 }
 
 impl Sphere {
+    /// What stands where a shape has gone.
+    pub(crate) const UNIT: Self = Self { radius: 1.0 };
+
     /// A sphere; radius in metres.
     ///
     /// # Errors

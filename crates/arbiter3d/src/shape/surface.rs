@@ -7,7 +7,7 @@
 use super::height_field::HeightField;
 use super::mesh::{Facet, MeshSides, TriangleMesh};
 use super::mesh_edges::Surroundings;
-use super::mesh_tree::{LEAF, Leaves};
+use super::mesh_tree::{Descent, LEAF, Leaves};
 use super::{Geometry, Shape};
 use crate::math::{Aabb, Real, Vec3};
 use crate::simd::{LaneVec3, Lanes};
@@ -57,6 +57,24 @@ impl<'a> Surface<'a> {
         match self {
             Self::Mesh(mesh) => mesh.walk(aabb, leaves),
             Self::Field(field) => field.walk(aabb, leaves),
+        }
+    }
+
+    /// Shows the leaves to a search that wants the nearest first.
+    #[inline]
+    pub(crate) fn descend(self, limit: Real, search: &mut impl Descent) {
+        match self {
+            Self::Mesh(mesh) => mesh.descend(limit, search),
+            Self::Field(field) => field.descend(limit, search),
+        }
+    }
+
+    /// The user's number of a triangle.
+    #[inline(always)]
+    pub(crate) fn id(self, index: usize) -> u32 {
+        match self {
+            Self::Mesh(mesh) => mesh.id(index),
+            Self::Field(_) => index as u32,
         }
     }
 

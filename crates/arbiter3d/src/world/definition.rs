@@ -531,7 +531,7 @@ impl ShapeDefinition {
 
     /// The same as a platform that bodies pass through along `direction` (unit vector, shape's frame) and stand on from
     /// the other side. A body that has begun to pass goes on passing until it is out again, whatever turns it
-    /// meanwhile.
+    /// meanwhile. Characters ([`ShapeMover`](crate::ShapeMover)) pass platforms of convex shape that they are not above.
     #[must_use]
     pub fn one_way(self, direction: Vec3) -> Self {
         Self { one_way: Some(direction), ..self }

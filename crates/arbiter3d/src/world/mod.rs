@@ -30,6 +30,7 @@ pub use definition::{
 };
 pub use events::{BeginEvent, BeginListener, ContactProvider, EndEvent, EndListener, SensorEvent, StepContext};
 pub use filters::{ContactFilter, PairFilter, ShapePair};
+pub(crate) use one_way::stops;
 pub use queries::{BodyKinds, CastHit, PointHit, QueryFilter, RayHit, ShapeContacts, ShapePredicate};
 pub use settings::WorldSettings;
 pub use shapes::{ShapeMut, ShapeRef};

@@ -14,7 +14,7 @@
 //! An arbiter that has begun is solid for its life. All is measured against the platform, so a moving one works alike.
 
 use super::pairs::{BORNE, HITS, ONE_WAY, PASSING, PERSIST, PRE_SOLVE, Pair};
-use super::shapes::ShapeSlot;
+use super::shapes::{ShapeRef, ShapeSlot};
 use crate::math::{Pose, Real, Rotation, Vec3};
 use crate::shape::Shape;
 
@@ -69,6 +69,15 @@ pub(super) fn lets_pass(
         direction.dot(end.position - start.position) >= 0.0
             || platform.geometry.is_convex()
                 && !is_above(&platform.geometry, direction, (visitor, start), speculative_distance)
+    })
+}
+
+/// Whether a one-way platform is in the way of a shape that is moved by hand: it is above the platform. Of platforms that are
+/// not convex nobody can tell; they always are.
+pub(crate) fn stops(platform: &ShapeRef<'_>, (visitor, pose): (&Shape, &Pose)) -> bool {
+    platform.one_way().is_none_or(|direction| {
+        let seen = platform.world_pose().relative(pose);
+        !platform.geometry().is_convex() || is_above(platform.geometry(), direction, (visitor, &seen), 0.0)
     })
 }
 

@@ -8,7 +8,7 @@ use crate::error::{Error, unit_rotation, unit_vec};
 use crate::id::{BodyId, ShapeId};
 use crate::math::{Aabb, Pose, Quat, Real, Vec3};
 use crate::place_table::mix;
-use crate::shape::Shape;
+use crate::shape::{Shape, Sphere};
 use crate::storage;
 use std::sync::Arc;
 
@@ -375,8 +375,11 @@ impl World {
         let shapes = &self.shapes;
         let hash = |slot: u32| mix(0, shapes[slot as usize].id.0);
         self.shape_slots.remove(hash(slot), slot, hash);
-        self.shapes[slot as usize].body = NONE;
-        self.sensors -= u32::from(self.shapes[slot as usize].sensor);
+        let shape = &mut self.shapes[slot as usize];
+        shape.body = NONE;
+        // A hull or a mesh is let go of now, not when the place is taken again.
+        shape.geometry = Shape::Sphere(Sphere::UNIT);
+        self.sensors -= u32::from(shape.sensor);
         self.free_shapes.push(slot);
     }
 

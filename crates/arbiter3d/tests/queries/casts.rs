@@ -161,6 +161,30 @@ fn casts_by_hand() {
     assert!(hit.normal.distance(Vec3::Y) < 1e-5);
 }
 
+/// Exactly one radius from a wall: what falls along it meets the floor, what presses on it the wall, at once and level.
+#[test]
+fn what_touches_a_wall_slides_along_it() {
+    let mut world = weightless();
+    let floor = ShapeDefinition::new(cuboid(20.0, 1.0, 20.0)).at(Vec3::Y * -1.0);
+    let floor = world.add_shape(BodyId::WORLD, &floor).unwrap();
+    let wall = ShapeDefinition::new(cuboid(1.0, 10.0, 5.0)).at(Vec3::X * 2.0);
+    let wall = world.add_shape(BodyId::WORLD, &wall).unwrap();
+    for (shape, low) in [(capsule(0.5, 0.5), 1.0), (sphere(0.5), 0.5)] {
+        let cast = |way: Vec3| {
+            let cast = ShapeCast::along(&shape, Pose::from_position(Vec3::new(0.5, 3.0, 0.3)), way);
+            world.cast_shape(&cast, &QueryFilter::default()).unwrap()
+        };
+        let fall = cast(Vec3::Y * -5.0).unwrap();
+        assert_eq!(fall.shape, floor);
+        assert_near(fall.fraction, (3.0 - low) / 5.0, 1e-5, "fraction of the fall");
+        assert!(fall.normal.distance(Vec3::Y) < 1e-5, "{fall:?}");
+        let push = cast(Vec3::X).unwrap();
+        assert_eq!(push.shape, wall);
+        assert!(push.fraction < 1e-5 && push.depth < 1e-5 && push.normal.distance(-Vec3::X) < 1e-5, "{push:?}");
+        assert!(cast(Vec3::new(-1.0, 0.0, 3.0)).is_none());
+    }
+}
+
 /// A rod of length 2 that stands 0.5 in front of a wall and turns by 90° about z hits with its end at 30°.
 #[test]
 fn a_turning_rod_hits_with_its_end() {

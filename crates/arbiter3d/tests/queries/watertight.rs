@@ -1,13 +1,18 @@
-//! Rays at shared edges and corners of meshes: none slips through. And as many rays as it takes against brute force.
+//! Rays at shared edges and corners of meshes and height fields: none slips through. And as many rays as it takes against brute force.
 
 use crate::common::*;
 use crate::{brute_force, strewn_with};
 use arbiter3d::math::Vec3;
-use arbiter3d::{BodyDefinition, MeshSides, QueryFilter, Shape, ShapeDefinition, TriangleMesh, World};
+use arbiter3d::{
+    BodyDefinition, FieldDiagonals, HeightField, MeshSides, QueryFilter, Shape, ShapeDefinition, TriangleMesh, World,
+};
 use std::sync::Arc;
 
+/// Corners and triangles.
+type Surface = (Vec<Vec3>, Vec<[u32; 3]>);
+
 /// A ball with bumps: an octahedron whose faces are cut into four, `levels` times.
-fn bumpy_ball(levels: usize) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+fn bumpy_ball(levels: usize) -> Surface {
     let mut vertices = vec![Vec3::X, -Vec3::X, Vec3::Y, -Vec3::Y, Vec3::Z, -Vec3::Z];
     let mut triangles = vec![[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
     for _ in 0..levels {
@@ -32,7 +37,7 @@ fn bumpy_ball(levels: usize) -> (Vec<Vec3>, Vec<[u32; 3]>) {
 }
 
 /// Hills with an open rim.
-fn hills(cells: usize) -> (Vec<Vec3>, Vec<[u32; 3]>) {
+fn hills(cells: usize) -> Surface {
     let mut random = Random(72);
     let side = cells + 1;
     let vertices = (0..side * side)
@@ -96,15 +101,15 @@ fn closed_mesh(count: usize) {
     }
 }
 
+/// Cells along each side of the hills.
+const CELLS: usize = 40;
+
 /// Rays from above at the inner seams of open hills, steep and slanted, near and far.
-fn open_mesh(count: usize) {
+fn open_ground(count: usize, (vertices, triangles): &Surface, cast: impl Fn(Vec3, Vec3) -> Option<f32>) {
     let mut random = Random(74);
-    let cells = 40;
-    let (vertices, triangles) = hills(cells);
-    let mesh = TriangleMesh::new(vertices.clone(), triangles.clone()).unwrap();
-    let extent = cells as f32 * 0.7;
+    let extent = CELLS as f32 * 0.7;
     for k in 0..count {
-        let target = seam(&mut random, &vertices, &triangles);
+        let target = seam(&mut random, vertices, triangles);
         if target.x < 1.0 || target.z < 1.0 || target.x > extent - 1.0 || target.z > extent - 1.0 {
             continue;
         }
@@ -112,8 +117,24 @@ fn open_mesh(count: usize) {
         let height = [1.0, 20.0, 500.0][k % 3];
         let slant = if k % 4 == 0 { 0.0 } else { 0.3 * height };
         let eye = target + Vec3::new(random.range(-slant, slant), height, random.range(-slant, slant));
-        let hit = mesh.cast_ray(eye, target - eye, 2.0);
-        assert!(hit.is_some_and(|hit| hit.distance < 1.0 + 1e-3), "ray {k} from {eye} to {target} leaks");
+        let hit = cast(eye, target - eye);
+        assert!(hit.is_some_and(|fraction| fraction < 1.0 + 1e-3), "ray {k} from {eye} to {target} leaks");
+    }
+}
+
+fn open_mesh(count: usize) {
+    let hills = hills(CELLS);
+    let mesh = TriangleMesh::new(hills.0.clone(), hills.1.clone()).unwrap();
+    open_ground(count, &hills, |eye, way| mesh.cast_ray(eye, way, 2.0).map(|hit| hit.distance));
+}
+
+/// The same hills as a height field, cut either way.
+fn height_field(count: usize) {
+    let heights: Vec<f32> = hills(CELLS).0.iter().map(|corner| corner.y).collect();
+    for diagonals in [FieldDiagonals::Falling, FieldDiagonals::Alternating] {
+        let field = HeightField::new(heights.clone(), CELLS + 1, [0.7, 0.7]).unwrap().with_diagonals(diagonals);
+        let surface = Shape::HeightField(Arc::new(field.clone())).triangulate(0);
+        open_ground(count / 2, &surface, |eye, way| field.cast_ray(eye, way, 2.0).map(|hit| hit.distance));
     }
 }
 
@@ -128,10 +149,16 @@ fn no_ray_leaks_through_the_seams_of_an_open_mesh() {
 }
 
 #[test]
-#[ignore = "10⁷ rays"]
+fn no_ray_leaks_through_the_seams_of_a_height_field() {
+    height_field(500_000);
+}
+
+#[test]
+#[ignore = "10⁷ rays at each kind of surface"]
 fn no_ray_of_ten_million_leaks() {
-    closed_mesh(5_000_000);
-    open_mesh(5_000_000);
+    closed_mesh(10_000_000);
+    open_mesh(10_000_000);
+    height_field(10_000_000);
 }
 
 /// Closest hits of the world are those of asking each shape on its own.

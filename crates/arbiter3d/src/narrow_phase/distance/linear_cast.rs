@@ -22,6 +22,8 @@ const SHELL: f64 = 1e-5;
 const TOUCHING: f64 = 1e-13;
 /// Rounding of a coordinate, as a share of the size.
 const ROUNDING: f64 = 1e-14;
+/// Sine of the angle under which a motion from a touch is along the surface.
+const GRAZING: f64 = 1e-6;
 /// A new extreme point that gains less than this share of the distance is none.
 const GAIN: f64 = 1e-12;
 /// Far more than polyhedra need. After it the time reached is given back: early, never late.
@@ -166,11 +168,13 @@ impl Search<'_> {
         let distance = v.length();
         let normal = v / distance;
         let gap = distance - self.radius;
-        if gap <= 0.0 && self.time == 0.0 {
+        let closing = -normal.dot(self.displacement);
+        // What touches and slides along, or goes away, meets nothing.
+        let leaves = closing <= GRAZING * self.displacement.length();
+        if gap <= 0.0 && self.time == 0.0 && !(leaves && gap > -self.shell) {
             return Cast::Overlap;
         }
-        let closing = -normal.dot(self.displacement);
-        if closing <= 0.0 {
+        if closing <= 0.0 || leaves && self.time == 0.0 {
             return Cast::Miss;
         }
         // The plane, not the distance: it is as far away but for smooth shapes that took too many rounds, and never too

@@ -1,7 +1,9 @@
 //! Height fields against the mesh of the same triangles.
 
 use super::super::TriangleMesh;
+use super::super::surface_ray::SharpRay;
 use super::*;
+use crate::math::{max3, min3};
 
 /// Numbers from a linear congruential generator, in `[-1, 1)`.
 struct Random(u64);
