@@ -243,7 +243,7 @@ fn belts_carry_round_and_skids_slide_along_themselves() {
         let now = positions(&scene.world);
         for (index, way) in way.iter_mut().enumerate() {
             let (place, out) = (now[index], now[index].x.abs().max(now[index].z.abs()));
-            assert!((place.y - 1.25).abs() < 0.1 && (2.9..5.1).contains(&out), "step {step}: box {index} at {place}");
+            assert!((place.y - 1.25).abs() < 0.01 && (2.9..5.1).contains(&out), "step {step}: box {index} at {place}");
             *way += (place - last[index]).length();
         }
         last = now;

@@ -437,3 +437,29 @@ fn anisotropy_is_checked_and_may_be_set_on_an_arbiter() {
     run(&mut world, 1.0);
     assert_near(velocity(&world, body).x, 5.0 - 0.05 * GRAVITY, 0.05, "speed after a second");
 }
+
+/// A plate that twists on the spot is braked by the friction that its corners have the way they slide there: of a point at
+/// (x, z) seen from the middle, the friction ellipse leaves `μ √((ratio z)² + x²)` as torque a newton, if it is `ratio` times
+/// smaller along x.
+#[test]
+fn a_twisting_plate_is_braked_by_the_friction_ellipse() {
+    let (half, friction) = (Vec3::new(0.6, 0.1, 0.3), 0.4);
+    for (direction, ratio, lever) in [
+        (Vec3::X, 1.0, (0.36_f32 + 0.09).sqrt()),
+        (Vec3::X, 0.1, (0.36_f32 + 0.0009).sqrt()),
+        (Vec3::Z, 0.1, (0.0036_f32 + 0.09).sqrt()),
+    ] {
+        let mut world = sleepless();
+        floor(&mut world, 0.0);
+        let plate = ShapeDefinition::new(Shape::cuboid(half).unwrap()).friction(friction).rolling_resistance(0.0);
+        let plate = if ratio < 1.0 { plate.anisotropy(direction, ratio) } else { plate };
+        let body = add(&mut world, &BodyDefinition::dynamic().at(Vec3::Y * 0.1), &plate);
+        run(&mut world, 0.3);
+        world.body_mut(body).unwrap().set_angular_velocity(Vec3::Y * 6.0).unwrap();
+        run(&mut world, 0.25);
+        let mass = world.body(body).unwrap().mass_properties();
+        let braking = friction * GRAVITY * mass.mass * lever / mass.inertia.yy;
+        assert_relative(6.0 - spin(&world, body).y, braking * 0.25, 0.02, "spin lost");
+        assert!(velocity(&world, body).length() < 0.02, "stays: {}", velocity(&world, body));
+    }
+}

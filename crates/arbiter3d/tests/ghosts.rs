@@ -4,182 +4,30 @@ mod common;
 
 use arbiter3d::math::{Quat, Vec3};
 use arbiter3d::*;
+use common::floors::*;
 use common::*;
-
-/// Cells along each side of a floor.
-const CELLS: i32 = 32;
-/// Length of a cell, metres. Bodies start off the middle, so that they meet seams at all sorts of places.
-const CELL: f32 = 0.8;
-
-/// How a floor is put together; its top is at height zero.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Floor {
-    /// Boxes as shapes of one static body.
-    Shapes,
-    /// Boxes, each a static body.
-    Bodies,
-    /// Boxes on one kinematic body.
-    Platform,
-    /// A compound of boxes.
-    Compound,
-    /// Cells.
-    Voxels,
-    /// Two meshes that meet along a line.
-    Meshes,
-    /// Two boxes that overlap by half, of the same height.
-    Overlapping,
-    /// Boxes of random size that overlap.
-    Patchwork,
-}
-
-const FLOORS: [Floor; 8] = [
-    Floor::Shapes,
-    Floor::Bodies,
-    Floor::Platform,
-    Floor::Compound,
-    Floor::Voxels,
-    Floor::Meshes,
-    Floor::Overlapping,
-    Floor::Patchwork,
-];
 
 fn ice(shape: Shape) -> ShapeDefinition {
     ShapeDefinition::new(shape).friction(0.0).rolling_resistance(0.0)
-}
-
-/// Corners of the cells about the origin.
-fn cells() -> impl Iterator<Item = (i32, i32)> {
-    (0..CELLS * CELLS).map(|at| (at % CELLS - CELLS / 2, at / CELLS - CELLS / 2))
-}
-
-fn middle((x, z): (i32, i32)) -> Vec3 {
-    Vec3::new((x as f32 + 0.5) * CELL, -0.5 * CELL, (z as f32 + 0.5) * CELL)
-}
-
-/// A mesh of the half of the floor on one side of x = 0, two triangles a cell.
-fn half_mesh(side: i32) -> Shape {
-    let (mut corners, mut triangles) = (Vec::new(), Vec::new());
-    for (x, z) in cells().filter(|&(x, _)| (x < 0) == (side < 0)) {
-        let first = corners.len() as u32;
-        let corner = |i: i32, j: i32| Vec3::new((x + i) as f32 * CELL, 0.0, (z + j) as f32 * CELL);
-        corners.extend([corner(0, 0), corner(0, 1), corner(1, 0), corner(1, 1)]);
-        triangles.extend([[first, first + 1, first + 2], [first + 2, first + 1, first + 3]]);
-    }
-    Shape::mesh(corners, triangles).unwrap()
-}
-
-fn lay(world: &mut World, floor: Floor, material: &dyn Fn(Shape) -> ShapeDefinition) {
-    let half = 0.5 * CELL;
-    match floor {
-        Floor::Shapes | Floor::Platform => {
-            let body = if floor == Floor::Shapes {
-                BodyId::WORLD
-            } else {
-                world.add_body(&BodyDefinition::kinematic()).unwrap()
-            };
-            for cell in cells() {
-                world.add_shape(body, &material(cube(half)).at(middle(cell))).unwrap();
-            }
-        }
-        Floor::Bodies => {
-            for cell in cells() {
-                add(world, &BodyDefinition::fixed().at(middle(cell)), &material(cube(half)));
-            }
-        }
-        Floor::Compound => {
-            let children: Vec<_> = cells().map(|cell| CompoundChild::new(cube(half)).at(middle(cell))).collect();
-            world.add_shape(BodyId::WORLD, &material(Shape::compound(&children).unwrap())).unwrap();
-        }
-        Floor::Voxels => {
-            let grid = Shape::voxels(CELL, cells().map(|(x, z)| [x, -1, z])).unwrap();
-            world.add_shape(BodyId::WORLD, &material(grid)).unwrap();
-        }
-        Floor::Meshes => {
-            for side in [-1, 1] {
-                world.add_shape(BodyId::WORLD, &material(half_mesh(side))).unwrap();
-            }
-        }
-        Floor::Overlapping => {
-            for x in [-4.0, 4.0] {
-                let place = Vec3::new(x, -0.5, 0.0);
-                world.add_shape(BodyId::WORLD, &material(cuboid(8.0, 0.5, 14.0)).at(place)).unwrap();
-            }
-        }
-        Floor::Patchwork => {
-            let mut random = Random(7);
-            for cell in cells() {
-                let size = Vec3::new(random.range(1.0, 1.8), random.range(0.4, 0.9), random.range(1.0, 1.8)) * half;
-                let place = Vec3::new(middle(cell).x, -size.y, middle(cell).z);
-                let shape = Shape::cuboid(size).unwrap();
-                world.add_shape(BodyId::WORLD, &material(shape).at(place)).unwrap();
-            }
-        }
-    }
 }
 
 fn drifter(at: Vec3, along: Vec3, rotation: Quat) -> BodyDefinition {
     BodyDefinition { can_sleep: false, ..BodyDefinition::dynamic().at(at).rotated(rotation).moving(along, Vec3::ZERO) }
 }
 
-/// Slides bodies of a shape in some directions without friction, each in a world of its own, and tells what they felt.
-fn slide(floor: Floor, name: &str, shape: &Shape, (height, lying): (f32, Quat), directions: usize) -> Vec<String> {
-    let speed = 4.0;
-    let mut felt = Vec::new();
-    for direction in 0..directions {
-        let mut world = world();
-        lay(&mut world, floor, &ice);
-        let angle = 360.0 * (direction as f32 + 0.13) / directions as f32;
-        let along = heading(angle);
-        let start = Vec3::new(0.07, height, 0.11) - along * 5.0;
-        // Turned at random about the vertical, so that corners, edges and faces lead.
-        let about = turn(Vec3::Y, 37.0 * direction as f32) * lying;
-        let body = add(&mut world, &drifter(start, along * speed, about), &ice(shape.clone()));
-        run(&mut world, 0.25);
-        let (mut fastest, mut least) = (0.0_f32, speed);
-        for _ in 0..150 {
-            world.step(DT).unwrap();
-            let v = velocity(&world, body);
-            fastest = fastest.max(v.y.abs());
-            least = least.min(v.dot(along));
-        }
-        let moved = position(&world, body) - start;
-        let sideways = (moved - along * moved.dot(along)) * Vec3::new(1.0, 0.0, 1.0);
-        let good = moved.dot(along) > 10.0 * 0.999 && least > 0.999 * speed;
-        if !(good && fastest < 1e-3 && sideways.length() < 2e-3) {
-            felt.push(format!(
-                "{name} on {floor:?} towards {angle}°: {} m, at least {least} m/s, {} m sideways, up or down at {fastest} m/s",
-                moved.dot(along),
-                sideways.length()
-            ));
-        }
-    }
-    felt
-}
-
-fn directions() -> usize {
-    if std::env::var_os("ARBITER3D_LONG").is_some() { 32 } else { 6 }
-}
-
-fn slide_over(floors: &[Floor], count: usize) {
-    let flat = Quat::IDENTITY;
-    let side = turn(Vec3::Z, 90.0);
-    let hull = Shape::hull(
-        &[-0.3, 0.3].map(|x| [-0.2, 0.2].map(|y| [-0.4, 0.4].map(|z| Vec3::new(x, y, z)))).concat().concat(),
-    );
-    let bodies = [
-        ("a box", cuboid(0.3, 0.2, 0.5), (0.2, flat)),
-        ("a ball", sphere(0.3), (0.3, flat)),
-        ("a lying capsule", capsule(0.4, 0.2), (0.2, side)),
-        ("a hull", hull.unwrap(), (0.2, flat)),
-        ("a standing cylinder", Shape::cylinder(0.3, 0.25).unwrap(), (0.3, flat)),
-    ];
+/// Slides all kinds of shapes over floors in 32 directions: no vertical speed of 1 mm/s, no speed lost, no way aside.
+fn slide_over(floors: &[Floor]) {
+    let sliders = sliders();
     let mut felt = Vec::new();
     for &floor in floors {
-        // Meshes know no contacts with cylinders.
-        let known =
-            bodies.iter().filter(|(_, shape, _)| floor != Floor::Meshes || !matches!(shape, Shape::Cylinder(_)));
-        for (name, shape, lies) in known {
-            felt.extend(slide(floor, name, shape, *lies, count));
+        for passage in slide(floor, &sliders) {
+            let name = sliders[passage.slider].name;
+            // The line on which a can lies is handed from shape to shape in up to four pieces.
+            let level = if name == "a lying cylinder" { 2e-3 } else { 1e-3 };
+            let Passage { bump, least, ahead, aside, .. } = passage;
+            if !(ahead > 11.0 * 0.999 && least > 0.999 && bump < level && aside < 2e-3) {
+                felt.push(format!("{name} on {floor:?}: {passage:?}"));
+            }
         }
     }
     assert!(felt.is_empty(), "{}", felt.join("\n"));
@@ -187,48 +35,42 @@ fn slide_over(floors: &[Floor], count: usize) {
 
 #[test]
 fn nothing_is_felt_of_the_seams_between_shapes() {
-    slide_over(&FLOORS[..3], directions());
+    slide_over(&[Floor::Shapes, Floor::Bodies]);
+}
+
+#[test]
+fn nothing_is_felt_of_the_seams_between_shapes_of_a_platform_and_of_meshes() {
+    slide_over(&[Floor::Platform, Floor::Meshes, Floor::Tiles]);
 }
 
 #[test]
 fn nothing_is_felt_of_the_seams_within_a_shape() {
-    slide_over(&FLOORS[3..6], directions());
+    slide_over(&[Floor::Compound, Floor::Voxels, Floor::Mesh, Floor::Field]);
 }
 
 #[test]
 fn nothing_is_felt_of_shapes_that_overlap() {
-    slide_over(&FLOORS[6..], directions());
+    slide_over(&[Floor::Overlapping, Floor::Patchwork]);
 }
 
-/// All directions of all floors: a minute.
+/// What rolls with friction keeps its line and its speed, in 32 directions on all floors. Balls to a millimetre and without
+/// a bump; of capsules and cylinders, whose line of contact seams cut into pieces, the way is good to 3 cm in 10 m.
 #[test]
-#[ignore = "long: 32 directions"]
-fn nothing_is_felt_in_any_of_32_directions() {
-    slide_over(&FLOORS, 32);
-}
-
-/// Balls that roll with friction keep their line and their speed.
-#[test]
-fn rolling_balls_keep_their_line() {
+fn what_rolls_keeps_its_line() {
+    let rollers = rollers();
+    let mut felt = Vec::new();
     for floor in FLOORS {
-        for direction in 0..directions() {
-            let mut world = world();
-            let grip = |shape: Shape| ShapeDefinition::new(shape).friction(0.8).rolling_resistance(0.0);
-            lay(&mut world, floor, &grip);
-            let along = heading(360.0 * (direction as f32 + 0.13) / directions() as f32);
-            let start = Vec3::new(0.03, 0.3, 0.05) - along * 5.0;
-            let rolling = BodyDefinition {
-                can_sleep: false,
-                ..BodyDefinition::dynamic().at(start).moving(along * 3.0, Vec3::Y.cross(along) * 10.0)
-            };
-            let body = add(&mut world, &rolling, &grip(sphere(0.3)));
-            run(&mut world, 3.4);
-            let moved = position(&world, body) - start;
-            let sideways = moved.dot(Vec3::Y.cross(along));
-            assert!((moved.dot(along) - 10.2).abs() < 0.02, "{floor:?}: {} m", moved.dot(along));
-            assert!(sideways.abs() < 1e-3, "{floor:?} {direction}: {sideways} m off its line");
+        for passage in roll(floor, &rollers) {
+            let name = rollers[passage.slider].name;
+            let line = if name == "a ball" { 1e-3 } else { 0.03 };
+            let Passage { bump, ahead, aside, turned, .. } = passage;
+            let level = bump < 1e-3 || name != "a ball";
+            if !((ahead - 10.2).abs() < 0.02 && aside < line && level && turned < 0.01) {
+                felt.push(format!("{name} on {floor:?}: {passage:?}"));
+            }
         }
     }
+    assert!(felt.is_empty(), "{}", felt.join("\n"));
 }
 
 /// Where a body of 0.4 m is after it has slid towards x = 0 from the left, with something built there.

@@ -253,9 +253,16 @@ pub(crate) struct ShapeSpec {
     pub height_field: Option<HeightFieldSpec>,
     /// Solid cubic cells.
     pub voxels: Option<VoxelsSpec>,
-    /// Placed geometries that are one shape: of each child only geometry, `scale`, `rounding`, `position`, `rotation` and
-    /// `turn` count.
+    /// Placed geometries that are one shape: of each child only geometry, `scale`, `rounding`, `position`, `rotation`,
+    /// `turn`, `density_factor` and `part` count.
     pub compound: Option<Vec<ShapeSpec>>,
+    /// Of a child of a compound: how many times as dense it is as the rest, zero or more. Default 1.
+    pub density_factor: Option<Number>,
+    /// Of a child of a compound: which of the compound's `palette` its surface is. Default 0.
+    pub part: Option<u8>,
+    /// Surfaces of the parts of a compound, of voxels or of a height field, by their numbers; parts with a number past the end
+    /// have the surface of the shape. Default: all have.
+    pub palette: Vec<SurfaceSpec>,
     /// Name of a mesh in `meshes`.
     pub mesh: Option<String>,
     /// Cuts a closed mesh into convex hulls, of which at most this share (above 0) may be empty: 0.05 is a good start.
@@ -295,8 +302,29 @@ pub(crate) struct ShapeSpec {
     pub one_way: Option<Triple>,
 }
 
+/// What a part of a shape is made of.
+#[derive(Debug, Default, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields, default)]
+pub(crate) struct SurfaceSpec {
+    /// Coulomb friction. Default 0.5.
+    pub friction: Option<Number>,
+    /// Share of the approach speed given back, 0 to 1. Default 0.
+    pub restitution: Option<Number>,
+    /// Torque that resists rolling, as a share of normal force times radius. Default 0.01.
+    pub rolling_resistance: Option<Number>,
+    /// Velocity of the surface in the body's frame, m/s: a conveyor belt. Default [0, 0, 0].
+    pub tangent_velocity: Option<Triple>,
+    /// Friction that differs along a direction: skis, tracks. Default none.
+    pub anisotropy: Option<AnisotropySpec>,
+    /// How the frictions of two shapes make one. Default "maximum".
+    pub friction_combine: Option<CombineSpec>,
+    /// How the restitutions of two shapes make one. Default "maximum".
+    pub restitution_combine: Option<CombineSpec>,
+}
+
 /// Friction that differs along a direction.
-#[derive(Debug, Deserialize)]
+#[derive(Clone, Copy, Debug, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(crate) struct AnisotropySpec {
@@ -394,6 +422,9 @@ pub(crate) struct HeightFieldSpec {
     pub points_per_row: usize,
     /// From one point to the next along x and along z, metres.
     pub cell: [Number; 2],
+    /// Of each cell in turn, row by row, which of the shape's `palette` its surface is. Default: all 0.
+    #[serde(default)]
+    pub parts: Vec<u8>,
 }
 
 /// Solid cubic cells.
@@ -405,6 +436,9 @@ pub(crate) struct VoxelsSpec {
     pub cell_size: Number,
     /// The solid cells: cell [i, j, k] reaches from (i, j, k) to (i + 1, j + 1, k + 1) times the cell size.
     pub cells: Vec<[i32; 3]>,
+    /// Of each cell in turn, which of the shape's `palette` its surface is. Default: all 0.
+    #[serde(default)]
+    pub parts: Vec<u8>,
 }
 
 /// A triangle.

@@ -1,14 +1,14 @@
 //! Fills a world from a scene file.
 
 use super::format::{
-    AxisSpec, BodySpec, CombineSpec, GridSpec, HullSpec, KindSpec, Number, SceneFile, ShapeSpec, Triple, Turn,
-    WorldSpec,
+    AxisSpec, BodySpec, CombineSpec, GridSpec, HullSpec, KindSpec, Number, SceneFile, ShapeSpec, SurfaceSpec, Triple,
+    Turn, VoxelsSpec, WorldSpec,
 };
 use super::{obj, parse};
 use crate::problem::{Place, Problem};
 use arbiter3d::{
-    Anisotropy, BodyDefinition, BodyKind, CombineRule, CompoundChild, DecompositionSettings, Filter, LockedAxes,
-    Material, Shape, ShapeDefinition, World, WorldSettings,
+    Anisotropy, BodyDefinition, BodyKind, CombineRule, CompoundChild, DecompositionSettings, Filter, HeightField,
+    LockedAxes, Material, Shape, ShapeDefinition, VoxelGrid, World, WorldSettings,
     math::{Quat, Real, Vec3},
 };
 use arbiter3d_scenes::{BuiltScene, Random, SceneOptions, turns};
@@ -231,9 +231,15 @@ impl Template {
 }
 
 fn shape_definition(spec: &ShapeSpec, meshes: &Meshes, path: &str) -> Result<ShapeDefinition, Complaint> {
-    let default = Material::default();
-    let number = |given: Option<Number>, default: Real| given.map_or(default, |number| number.0);
-    let combine_rule = |given: Option<CombineSpec>, default| given.map_or(default, combine);
+    let surface = SurfaceSpec {
+        friction: spec.friction,
+        restitution: spec.restitution,
+        rolling_resistance: spec.rolling_resistance,
+        tangent_velocity: spec.tangent_velocity,
+        anisotropy: spec.anisotropy,
+        friction_combine: spec.friction_combine,
+        restitution_combine: spec.restitution_combine,
+    };
     let filter = spec.filter.as_ref().map_or(Filter::default(), |filter| Filter {
         category: filter.category.unwrap_or(1),
         mask: filter.mask.unwrap_or(u64::MAX),
@@ -242,21 +248,29 @@ fn shape_definition(spec: &ShapeSpec, meshes: &Meshes, path: &str) -> Result<Sha
     Ok(ShapeDefinition {
         position: spec.position.map_or(Vec3::ZERO, vector),
         rotation: rotation(spec.rotation, spec.turn, path)?,
-        density: number(spec.density, 1000.0),
-        material: Material {
-            friction: number(spec.friction, default.friction),
-            restitution: number(spec.restitution, default.restitution),
-            rolling_resistance: number(spec.rolling_resistance, default.rolling_resistance),
-            tangent_velocity: spec.tangent_velocity.map_or(default.tangent_velocity, vector),
-            anisotropy: spec.anisotropy.as_ref().map(|it| Anisotropy::new(vector(it.direction), it.ratio.0)),
-            friction_combine: combine_rule(spec.friction_combine, default.friction_combine),
-            restitution_combine: combine_rule(spec.restitution_combine, default.restitution_combine),
-        },
+        density: spec.density.map_or(1000.0, |number| number.0),
+        material: material(&surface),
+        palette: spec.palette.iter().map(material).collect(),
         filter,
         sensor: spec.sensor,
         one_way: spec.one_way.map(vector),
         ..ShapeDefinition::new(geometry(spec, meshes, path)?)
     })
+}
+
+fn material(spec: &SurfaceSpec) -> Material {
+    let default = Material::default();
+    let number = |given: Option<Number>, default: Real| given.map_or(default, |number| number.0);
+    let combine_rule = |given: Option<CombineSpec>, default| given.map_or(default, combine);
+    Material {
+        friction: number(spec.friction, default.friction),
+        restitution: number(spec.restitution, default.restitution),
+        rolling_resistance: number(spec.rolling_resistance, default.rolling_resistance),
+        tangent_velocity: spec.tangent_velocity.map_or(default.tangent_velocity, vector),
+        anisotropy: spec.anisotropy.as_ref().map(|it| Anisotropy::new(vector(it.direction), it.ratio.0)),
+        friction_combine: combine_rule(spec.friction_combine, default.friction_combine),
+        restitution_combine: combine_rule(spec.restitution_combine, default.restitution_combine),
+    }
 }
 
 /// The one geometry that a shape is given, scaled and rounded.
@@ -289,6 +303,8 @@ fn compound_child(spec: &ShapeSpec, meshes: &Meshes, path: &str) -> Result<Compo
     Ok(CompoundChild {
         position: spec.position.map_or(Vec3::ZERO, vector),
         rotation: rotation(spec.rotation, spec.turn, path)?,
+        density_factor: spec.density_factor.map_or(1.0, |number| number.0),
+        material: spec.part.unwrap_or(0),
         ..CompoundChild::new(geometry(spec, meshes, path)?)
     })
 }
@@ -320,10 +336,13 @@ fn plain_geometry(spec: &ShapeSpec, meshes: &Meshes, path: &str) -> Result<Shape
         "height_field",
         spec.height_field.as_ref().map(|s| {
             let heights = s.heights.iter().map(|height| height.0).collect();
-            Shape::height_field(heights, s.points_per_row, s.cell.map(|cell| cell.0))
+            let field = HeightField::new(heights, s.points_per_row, s.cell.map(|cell| cell.0))?;
+            let parts = s.parts.clone();
+            let field = if parts.is_empty() { field } else { field.with_materials(parts)? };
+            Ok(Shape::HeightField(field.into()))
         }),
     );
-    add("voxels", spec.voxels.as_ref().map(|s| Shape::voxels(s.cell_size.0, s.cells.iter().copied())));
+    add("voxels", spec.voxels.as_ref().map(voxels));
     if let Some(children) = &spec.compound {
         let path = format!("{path}.compound");
         let children = children
@@ -350,6 +369,16 @@ fn plain_geometry(spec: &ShapeSpec, meshes: &Meshes, path: &str) -> Result<Shape
             Err((path.to_owned(), message))
         }
     }
+}
+
+fn voxels(spec: &VoxelsSpec) -> Result<Shape, arbiter3d::ShapeError> {
+    let grid = VoxelGrid::new(spec.cell_size.0, spec.cells.iter().copied())?;
+    let (given, expected) = (spec.parts.len(), spec.cells.len());
+    if given != 0 && given != expected {
+        return Err(arbiter3d::ShapeError::WrongCount { what: "parts", given, expected });
+    }
+    let parts: Vec<_> = spec.cells.iter().copied().zip(spec.parts.iter().copied()).collect();
+    Ok(Shape::Voxels(grid.with_materials(&parts)?.into()))
 }
 
 fn rotation(quaternion: Option<[Number; 4]>, turn: Option<Turn>, path: &str) -> Result<Quat, Complaint> {
@@ -471,6 +500,34 @@ mod tests {
         let shape = world.shape(world.body(body).unwrap().shapes()[0]).unwrap();
         assert_eq!((shape.one_way(), shape.material().tangent_velocity), (Some(Vec3::Y), Vec3::X * 2.0));
         assert_eq!(shape.material().anisotropy, Some(Anisotropy::new(Vec3::Z, 0.25)));
+    }
+
+    #[test]
+    fn parts_have_surfaces_of_their_own() {
+        let head = r#"{"cuboid": {"half_extents": [0.1, 0.1, 0.2]}, "density_factor": 7.8, "part": 1}"#;
+        let handle = r#"{"capsule": {"half_length": 0.3, "radius": 0.02}, "position": [0, -0.4, 0]}"#;
+        let palette = r#""palette": [{"friction": 0.1}, {"friction": 0.7, "restitution": 0.5}]"#;
+        let hammer = format!(r#"{{"shapes": [{{"compound": [{handle}, {head}], {palette}}}]}}"#);
+        let cells = r#"{"cell_size": 1, "cells": [[0, 0, 0], [1, 0, 0]], "parts": [0, 1]}"#;
+        let ground = format!(r#"{{"kind": "static", "shapes": [{{"voxels": {cells}, {palette}}}]}}"#);
+        let field = r#"{"heights": [0, 0, 0, 0, 0, 0], "points_per_row": 3, "cell": [1, 1], "parts": [1, 0]}"#;
+        let field = format!(r#"{{"kind": "static", "shapes": [{{"height_field": {field}, {palette}}}]}}"#);
+        let world = built(&format!(r#"{{"bodies": [{hammer}, {ground}, {field}]}}"#)).unwrap();
+        let shape = |nth: usize| world.body(world.bodies().nth(nth).unwrap()).unwrap().shapes()[0];
+        let hammer = world.shape(shape(1)).unwrap();
+        assert_eq!(
+            hammer.palette().iter().map(|m| (m.friction, m.restitution)).collect::<Vec<_>>(),
+            [(0.1, 0.0), (0.7, 0.5)]
+        );
+        let Shape::Compound(compound) = hammer.geometry() else { panic!("a compound") };
+        let of = |child: usize| (compound.children()[child].material, compound.children()[child].density_factor);
+        assert_eq!((of(0), of(1)), ((0, 1.0), (1, 7.8)));
+        let Shape::Voxels(grid) = world.shape(shape(2)).unwrap().geometry() else { panic!("voxels") };
+        assert_eq!((grid.material([0, 0, 0]), grid.material([1, 0, 0])), (0, 1));
+        let short =
+            r#"{"bodies": [{"shapes": [{"voxels": {"cell_size": 1, "cells": [[0, 0, 0]], "parts": [1, 2]}}]}]}"#;
+        let complaint = built(short).err().unwrap();
+        assert!(complaint.0 == "bodies[0].shapes[0].voxels" && complaint.1.contains("parts"), "{complaint:?}");
     }
 
     #[test]

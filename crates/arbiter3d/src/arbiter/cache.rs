@@ -37,6 +37,7 @@ impl ContactData {
                 contact.inherit(&self.slots[slot]);
             }
             self.slots[slot] = contact;
+            self.other_slots &= !(1 << slot);
             return;
         }
         let mut nearest: Option<(usize, Real)> = None;
@@ -55,6 +56,7 @@ impl ContactData {
         };
         self.slots[slot] = contact;
         self.usage_mask |= 1 << slot;
+        self.other_slots &= !(1 << slot);
     }
 
     /// Which contact of a full cache makes room for `new`.

@@ -141,6 +141,9 @@ pub struct ContactData {
     pub(crate) usage_mask: u8,
     pub(crate) solve_mode: SolveMode,
     pub(crate) flags: u8,
+    /// Slots whose contacts are of other materials than the rest: [`ContactData::other_friction`] and
+    /// [`ContactData::other_restitution`] are theirs, and they are solved apart.
+    pub(crate) other_slots: u8,
     pub(crate) friction: Real,
     pub(crate) restitution: Real,
     pub(crate) rolling_resistance: Real,
@@ -153,6 +156,8 @@ pub struct ContactData {
     /// Direction along which friction differs, world axes, and by how much: with [`ANISOTROPIC`] alone.
     pub(crate) friction_direction: Vec3,
     pub(crate) friction_ratio: Real,
+    pub(crate) other_friction: Real,
+    pub(crate) other_restitution: Real,
 }
 
 /// The user has set the friction: materials no longer reach it.
@@ -202,7 +207,26 @@ impl ContactData {
         (self.usage_mask & 15).count_ones() as usize
     }
 
-    /// Coulomb friction. Starts as the combination of the two materials, the maximum by default.
+    /// Coulomb friction of a contact (slot 0 to 3): of shapes with several materials, contacts may differ.
+    #[must_use]
+    pub fn friction_of(&self, slot: usize) -> Real {
+        if self.is_other(1 << (slot & 7)) { self.other_friction } else { self.friction }
+    }
+
+    /// Restitution of a contact (slot 0 to 3).
+    #[must_use]
+    pub fn restitution_of(&self, slot: usize) -> Real {
+        if self.is_other(1 << (slot & 7)) { self.other_restitution } else { self.restitution }
+    }
+
+    /// Whether the contacts in some slots are those of the second pair of materials.
+    #[inline(always)]
+    pub(crate) fn is_other(&self, slots: u8) -> bool {
+        self.other_slots & slots != 0
+    }
+
+    /// Coulomb friction. Starts as the combination of the two materials, the maximum by default. Of shapes with several
+    /// materials, that of the deepest contact: see [`ContactData::friction_of`].
     #[must_use]
     pub fn friction(&self) -> Real {
         self.friction
@@ -238,6 +262,7 @@ impl ContactData {
     /// If it is not from 0 to 10⁶.
     pub fn set_friction(&mut self, friction: Real) -> Result<(), Error> {
         self.friction = error::in_range("friction", friction, 0.0, 1e6)?;
+        self.other_friction = self.friction;
         self.flags |= FRICTION_OVERRIDDEN;
         Ok(())
     }
@@ -248,6 +273,7 @@ impl ContactData {
     /// If it is not from 0 to 1.
     pub fn set_restitution(&mut self, restitution: Real) -> Result<(), Error> {
         self.restitution = error::in_range("restitution", restitution, 0.0, 1.0)?;
+        self.other_restitution = self.restitution;
         self.flags |= RESTITUTION_OVERRIDDEN;
         Ok(())
     }

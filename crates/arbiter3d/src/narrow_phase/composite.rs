@@ -11,10 +11,10 @@
 //! The number of a feature holds that of the part: see [`feature_of`].
 
 use super::mesh_points::{Candidate, Candidates, NO_FACET};
-use super::seam::{self, Bearing, Patch};
+use super::seam::{self, Bearing, Patch, Verdict};
 use super::{Manifold, ManifoldPoint, PairCache, collide_on};
 use crate::math::{Aabb, Pose, Real, Vec3, min};
-use crate::query::Ray;
+use crate::query::{Ray, cast_placed};
 use crate::shape::{Compound, Cuboid, Geometry, Shape, VoxelGrid};
 use crate::simd::SimdLevel;
 
@@ -29,11 +29,18 @@ const FEATURE_BITS: u32 = 12;
 pub(crate) trait Parts: Geometry {
     /// Calls `visit` with the number, shape and pose of each part whose box overlaps `aabb`.
     fn parts(&self, aabb: &Aabb, visit: &mut dyn FnMut(u32, &Shape, &Pose));
+
+    /// Which material of the palette a part has where it is touched, given that of the part's own shape there.
+    fn material(&self, part: u32, own: u8, point: &ManifoldPoint) -> u8;
 }
 
 impl Parts for Compound {
     fn parts(&self, aabb: &Aabb, visit: &mut dyn FnMut(u32, &Shape, &Pose)) {
         self.for_each_child(aabb, |child, shape, pose| visit(child as u32, shape, pose));
+    }
+
+    fn material(&self, part: u32, own: u8, _: &ManifoldPoint) -> u8 {
+        self.child_material(part as usize, own)
     }
 }
 
@@ -42,6 +49,10 @@ impl Parts for VoxelGrid {
         self.for_each_box(aabb, |number, cuboid: Cuboid, center| {
             visit(number, &Shape::Cuboid(cuboid), &Pose::from_position(center));
         });
+    }
+
+    fn material(&self, _: u32, _: u8, point: &ManifoldPoint) -> u8 {
+        self.material_under(point.point1, point.normal)
     }
 }
 
@@ -87,9 +98,12 @@ pub(crate) fn collide(
             all = outside;
         }
     }
-    all.choose(|&Candidate { position, normal, separation, feature, .. }| {
+    let mut materials = [[0; 2]; 4];
+    all.choose(|&Candidate { position, normal, separation, feature, triangle, .. }| {
+        materials[manifold.points().len() & 3] = [triangle as u8, (triangle >> 8) as u8];
         manifold.push(ManifoldPoint { point1: position, normal, separation, feature });
     });
+    manifold.set_point_materials(&materials);
 }
 
 struct Contact<'a, P> {
@@ -108,7 +122,7 @@ struct Contact<'a, P> {
 
 impl<P: Parts> Contact<'_, P> {
     /// Shows the contacts of each part that is near, in the frame of the whole.
-    fn for_each(&self, mut visit: impl FnMut(u32, &Manifold)) {
+    fn for_each(&self, mut visit: impl FnMut(u32, &Manifold, (&Shape, &Pose))) {
         self.whole.parts(&self.near, &mut |number, shape, placed| {
             let mut found = Manifold::EMPTY;
             let kept = (&mut PairCache::default(), &mut found);
@@ -118,7 +132,7 @@ impl<P: Parts> Contact<'_, P> {
                 point.normal = placed.rotation.rotate(point.normal);
             }
             if !found.points().is_empty() {
-                visit(number, &found);
+                visit(number, &found, (shape, placed));
             }
         });
     }
@@ -126,8 +140,10 @@ impl<P: Parts> Contact<'_, P> {
     /// All points of all parts; notes the directions in which they bear.
     fn gather(&mut self, out: &mut Candidates) {
         let (mut bearings, mut count) = (self.bearings, 0);
-        self.for_each(|number, found| {
-            found.points().iter().for_each(|point| out.push(candidate(number, point)));
+        self.for_each(|number, found, _| {
+            for (at, point) in found.points().iter().enumerate() {
+                out.push(self.candidate(number, point, found.materials_of(at)));
+            }
             let mut left = (1_u32 << found.points().len()) - 1;
             while left != 0 {
                 let (patch, members) = patch_of(found, left);
@@ -144,22 +160,44 @@ impl<P: Parts> Contact<'_, P> {
 
     /// The points that are not at seams.
     fn gather_outside(&self, out: &mut Candidates) {
-        self.for_each(|number, found| {
+        self.for_each(|number, found, part| {
             let mut left = (1_u32 << found.points().len()) - 1;
             while left != 0 {
                 let (patch, members) = patch_of(found, left);
                 left &= !members;
-                if !self.is_hidden(&patch) {
-                    let points = found.points().iter().enumerate().filter(|(at, _)| members >> at & 1 == 1);
-                    points.for_each(|(_, point)| out.push(candidate(number, point)));
+                let normal = match self.verdict(&patch, part) {
+                    Verdict::Counts => patch.normal,
+                    Verdict::Straightened(normal) => normal,
+                    Verdict::Hidden => continue,
+                };
+                for (at, point) in found.points().iter().enumerate().filter(|(at, _)| members >> at & 1 == 1) {
+                    let separation = point.separation * patch.normal.dot(normal);
+                    let point = ManifoldPoint { normal, separation, ..*point };
+                    out.push(self.candidate(number, &point, found.materials_of(at)));
                 }
             }
         });
     }
 
-    fn is_hidden(&self, patch: &Patch) -> bool {
+    fn candidate(&self, part: u32, point: &ManifoldPoint, materials: [u8; 2]) -> Candidate {
+        let own = self.whole.material(part, materials[0], point);
+        Candidate {
+            position: point.point1,
+            normal: point.normal,
+            separation: point.separation,
+            feature: feature_of(part, point.feature),
+            facet: NO_FACET,
+            triangle: u32::from(own) | u32::from(materials[1]) << 8,
+        }
+    }
+
+    /// What a contact with a part is beside all bearings.
+    fn verdict(&self, patch: &Patch, (shape, placed): (&Shape, &Pose)) -> Verdict {
         let cast = |ray: &Ray| self.whole.cast_ray(ray);
-        self.bearings[..self.bearing_count].iter().any(|b| patch.is_hidden_by(b, &cast, self.seam))
+        let own = |ray: &Ray| cast_placed(shape, placed, ray);
+        let mut verdicts =
+            self.bearings[..self.bearing_count].iter().map(|b| patch.beside(b, (&cast, &own), self.seam));
+        verdicts.find(|verdict| *verdict != Verdict::Counts).unwrap_or(Verdict::Counts)
     }
 }
 
@@ -175,15 +213,4 @@ fn patch_of(found: &Manifold, mask: u32) -> (Patch, u32) {
         }
     }
     (patch, members)
-}
-
-fn candidate(part: u32, point: &ManifoldPoint) -> Candidate {
-    Candidate {
-        position: point.point1,
-        normal: point.normal,
-        separation: point.separation,
-        feature: feature_of(part, point.feature),
-        facet: NO_FACET,
-        triangle: part,
-    }
 }

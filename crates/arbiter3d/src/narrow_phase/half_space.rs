@@ -69,14 +69,12 @@ fn collide_surface(surface: Surface<'_>, pose: &Pose, margin: Real, manifold: &m
             }
         }
     });
-    let mut deepest = (Real::MAX, 0);
+    let mut materials = [[0; 2]; 4];
     candidates.choose(|c| {
-        if c.separation < deepest.0 {
-            deepest = (c.separation, surface.material(c.triangle as usize));
-        }
+        materials[manifold.points().len() & 3][1] = surface.material(c.triangle as usize);
         push(c.position + Vec3::Y * c.separation, c.feature, manifold);
     });
-    manifold.set_materials([0, deepest.1]);
+    manifold.set_point_materials(&materials);
 }
 
 fn push(point: Vec3, feature: u32, manifold: &mut Manifold) {

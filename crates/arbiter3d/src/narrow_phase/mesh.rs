@@ -70,15 +70,16 @@ impl Contact<'_> {
             reach.second_look = true;
             self.touch_all(solid, &frame, &reach, &mut candidates);
         }
-        let (mesh, manifold, mut deepest) = (self.mesh, &mut *self.manifold, (Real::MAX, 0));
+        let (mesh, manifold, mut materials) = (self.mesh, &mut *self.manifold, [[0; 2]; 4]);
+        let many = mesh.has_materials();
         candidates.choose(|candidate| {
-            if candidate.separation < deepest.0 {
-                deepest = (candidate.separation, candidate.triangle as usize);
+            if many {
+                materials[manifold.points().len() & 3][0] = mesh.material(candidate.triangle as usize);
             }
             manifold.push(point_in_mesh(mesh, &frame, candidate));
         });
-        if deepest.0 < Real::MAX {
-            manifold.set_materials([mesh.material(deepest.1), 0]);
+        if many {
+            manifold.set_point_materials(&materials);
         }
     }
 

@@ -47,6 +47,8 @@ const SAME_NORMAL: Real = 0.99985;
 const MERGE: [Real; 6] = [0.99, 0.9, 0.5, 0.0, -0.5, -2.0];
 /// Points less deep than the deepest by this share of the tolerance count as deepest: rounding, not rocking.
 const EQUALLY_DEEP: Real = 0.02;
+/// How much a fixed direction counts beside the distance from the middle, where corners are equally deep.
+const PREFERRED: Real = 0.1;
 /// Another choice must be better by this share, so that rounding does not swap equal ones from step to step.
 const TIE: Real = 1.000_001;
 
@@ -237,14 +239,22 @@ impl Candidates {
     }
 
     /// The deepest point of a group. Of several that are equally deep, an outermost one: a corner of the contact patch
-    /// rather than a point inside it, and the same one in every step.
+    /// rather than a point inside it (where parts of a floor meet under the patch), and the same one in every step.
     fn deepest_of(&self, groups: &Groups, group: usize) -> usize {
-        let least = self.members(groups, group).fold(Real::MAX, |m, (_, c)| min(m, c.separation));
+        let (mut least, mut sum, mut count) = (Real::MAX, Vec3::ZERO, 0.0);
+        for (_, candidate) in self.members(groups, group) {
+            least = min(least, candidate.separation);
+            sum += candidate.position;
+            count += 1.0;
+        }
+        let middle = sum * (1.0 / count);
         let (t1, t2) = tangents(groups.normal(group));
         let outwards = t1 + t2 * 0.618;
         let mut best = (0, -Real::MAX);
         for (i, candidate) in self.members(groups, group) {
-            let reach = candidate.position.dot(outwards);
+            let away = candidate.position - middle;
+            // Of corners that are about as far out, the first one along a fixed direction.
+            let reach = away.length() + PREFERRED * away.dot(outwards);
             if candidate.separation <= least + EQUALLY_DEEP * self.tolerance && reach > best.1 {
                 best = (i, reach);
             }

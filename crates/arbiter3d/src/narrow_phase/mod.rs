@@ -42,7 +42,7 @@ mod triangle_solid;
 pub(crate) use cores::Ellipsoid;
 pub(crate) use cuboid::{CuboidLanes, CuboidPair, Near as NearCuboids, WideManifold};
 pub(crate) use distance::{Cast, CastPoint, closest, linear_cast};
-pub(crate) use seam::{Cast as SeamCast, Patch, scale_of};
+pub(crate) use seam::{Cast as SeamCast, Patch, Verdict, scale_of};
 pub(crate) use support::Support;
 pub(crate) use time_of_impact::{Sweep, Touch, first_touch, gap, time_of_impact};
 
@@ -168,8 +168,7 @@ fn mirror(pose: &Pose, manifold: &mut Manifold) {
         point.point1 = pose.transform_point(point.point2());
         point.normal = -pose.rotation.rotate(point.normal);
     }
-    let [a, b] = manifold.materials();
-    manifold.set_materials([b, a]);
+    manifold.swap_materials();
 }
 
 #[cfg(test)]

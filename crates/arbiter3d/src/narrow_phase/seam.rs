@@ -15,6 +15,9 @@
 //! and the contact is not simply with the open surface at `p`, whose normal it then has: what lies in a hollow bears on it
 //! with several normals.
 //!
+//! A contact that leans by little from `m` and reaches into A bears on A: it is no ghost, only its normal is off (a can that
+//! lies across the edge of A leaves A soonest with a slight lean). It is straightened: it gets the normal `m`.
+//!
 //! A wall or a step rises inside A, a fence has points above the floor, behind the ridge of a roof the surface falls: none
 //! of these is a seam. A contact whose normal is as near to `m` as that of the bearing is no less true than it and never
 //! hidden, so of two contacts at most one goes. All is asked of the shapes by rays, so that it holds for boxes, hulls, meshes,
@@ -39,11 +42,17 @@ const INWARDS: Real = 0.02;
 const BEARS: Real = 0.9;
 /// A contact that pushes into the surface by more than this (a sine) is never hidden.
 const PUSHES_IN: Real = 0.3;
+/// A contact that leans by no more than this (a sine) bears if A goes on [`BESIDE_POINT`] scales beyond one of its points, the way
+/// it leans: the point is on the face of A, not at its edge.
+const LEANS: Real = 0.05;
+const BESIDE_POINT: Real = 0.05;
+/// How far above a point the open surface that it is on goes on, in scales.
+const GOES_ON: Real = 0.05;
 /// Normals are as near to the surface's if the squares of their distances differ by no more than this.
 const AS_NEAR: Real = 1e-8;
 
 /// A normal is that of the surface if the square of their distance is no more; of points that share a normal one has to be.
-const SAME_NORMAL: Real = 1e-7;
+const SAME_NORMAL: Real = 1e-9;
 /// The others may be off by more: points are given one normal where theirs differ by up to a degree.
 const ALIKE: Real = 7e-4;
 
@@ -69,26 +78,45 @@ pub(crate) struct Bearing {
     pub normal: Vec3,
 }
 
+/// What becomes of a contact beside a bearing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Verdict {
+    /// It is true as it is.
+    Counts,
+    /// It is at a seam.
+    Hidden,
+    /// It bears, with this normal.
+    Straightened(Vec3),
+}
+
 impl Patch {
-    /// Whether the contact is at a seam in a surface that there is a bearing on. `cast` casts rays at all of the surface, in
-    /// the frame of the points; `scale` is the length (metres) below which edges are none.
-    pub fn is_hidden_by(&self, bearing: &Bearing, cast: Cast<'_>, scale: Real) -> bool {
-        if self.is_no_seam(bearing, scale) || self.is_on_surface(cast, scale) {
-            return false;
+    /// What the contact is if there is this bearing on the same surface. `cast` casts rays at all of the surface and `own` at A,
+    /// in the frame of the points; `scale` is the length (metres) below which edges are none.
+    pub fn beside(&self, bearing: &Bearing, (cast, own): (Cast<'_>, Cast<'_>), scale: Real) -> Verdict {
+        if self.is_no_seam(bearing, scale) {
+            return Verdict::Counts;
         }
-        let Some(m) = surface_normal(bearing, cast, scale) else { return false };
+        let Some(m) = surface_normal(bearing, cast, scale) else { return Verdict::Counts };
         let off = |normal: Vec3| (normal - m).length_squared();
         let along = self.normal.dot(m);
         let across = self.normal - m * along;
-        let length = across.length();
-        if off(self.normal) <= off(bearing.normal) + AS_NEAR || along < -PUSHES_IN || length <= 0.0 {
-            return false;
+        let lean = across.length();
+        if off(self.normal) <= off(bearing.normal) + AS_NEAR || along < -PUSHES_IN || lean <= 0.0 {
+            return Verdict::Counts;
         }
-        let across = across * (1.0 / length);
-        let points = &self.points[..self.count];
+        let across = across * (1.0 / lean);
+        if self.is_on_surface(m, cast, scale) || !self.goes_on(bearing, (m, across), cast, scale) {
+            return Verdict::Counts;
+        }
+        let bears = lean <= LEANS && along > 0.0 && self.is_on_face(own, (m, across), scale);
+        if bears { Verdict::Straightened(m) } else { Verdict::Hidden }
+    }
+
+    /// Whether the surface goes on at each point, across the seam and inwards.
+    fn goes_on(&self, bearing: &Bearing, (m, across): (Vec3, Vec3), cast: Cast<'_>, scale: Real) -> bool {
         let middle = self.middle();
         let flat = ACROSS * scale;
-        points.iter().all(|&point| {
+        self.points[..self.count].iter().all(|&point| {
             let point = point + (middle - point) * INWARDS;
             let lift = LIFT * scale + max((bearing.point - point).dot(m), 0.0);
             let Some(there) = height(cast, point + across * flat, m, (lift, flat)) else { return false };
@@ -96,6 +124,15 @@ impl Patch {
                 let here = height(cast, point - across * (inside * scale), m, (lift, lift));
                 here.is_some_and(|here| here < lift && here <= there + flat)
             })
+        })
+    }
+
+    /// Whether A goes on level beyond a point, the way the contact leans.
+    fn is_on_face(&self, own: Cast<'_>, (m, across): (Vec3, Vec3), scale: Real) -> bool {
+        self.points[..self.count].iter().any(|&point| {
+            let origin = point + across * (BESIDE_POINT * scale) + m * scale;
+            let hit = own(&Ray { origin, direction: -m, max_fraction: 2.0 * scale });
+            hit.is_some_and(|hit| hit.normal.dot(m) > BEARS && (hit.fraction - scale).abs() < LEANS * scale)
         })
     }
 }
@@ -112,12 +149,14 @@ impl Patch {
     }
 
     /// Whether the contact is with the open surface itself: what lies in a hollow bears on it with more than one normal, and
-    /// all are true.
-    fn is_on_surface(&self, cast: Cast<'_>, scale: Real) -> bool {
+    /// all are true. Looked at a little above the points, seen along `up`: there a wall goes on, and a side that another
+    /// shape covers does not.
+    fn is_on_surface(&self, up: Vec3, cast: Cast<'_>, scale: Real) -> bool {
         let middle = self.middle();
         let mut exact = false;
         let near = self.points[..self.count].iter().all(|&point| {
-            let bearing = Bearing { point: point + (middle - point) * INWARDS, normal: self.normal };
+            let point = point + (middle - point) * INWARDS + up * (GOES_ON * scale);
+            let bearing = Bearing { point, normal: self.normal };
             let off = surface_normal(&bearing, cast, scale).map(|normal| (normal - self.normal).length_squared());
             exact |= off.is_some_and(|off| off <= SAME_NORMAL);
             off.is_some_and(|off| off <= ALIKE)
@@ -148,7 +187,15 @@ fn surface_normal(bearing: &Bearing, cast: Cast<'_>, scale: Real) -> Option<Vec3
 /// How high a surface is over a point, looked for from `lift` above it (there if it is even higher) to `depth` below.
 fn height(cast: Cast<'_>, point: Vec3, up: Vec3, (lift, depth): (Real, Real)) -> Option<Real> {
     let ray = Ray { origin: point + up * lift, direction: -up, max_fraction: lift + depth };
-    beside(&ray, lift).iter().find_map(cast).map(|hit| lift - hit.fraction)
+    let mut highest = None;
+    for hit in beside(&ray, lift).iter().filter_map(cast) {
+        if hit.normal != Vec3::ZERO {
+            return Some(lift - hit.fraction);
+        }
+        // It starts inside, maybe only by rounding: in the floor below a wall.
+        highest = Some(lift);
+    }
+    highest
 }
 
 /// A ray and two beside it: rounding leaves cracks between shapes that only touch, and a ray can fall into one.

@@ -15,7 +15,9 @@
 //! of one that stands on it with an overhang), the crossing says nothing, and is left out. First all is looked for within a short way; only if nothing touches
 //! so, the surfaces may have run into each other, and everything up to the size of the smaller one is looked at.
 //!
-//! Triangles of two-sided meshes push to their front here. The points go through the same choice as those of a mesh with a
+//! Triangles of two-sided meshes push to their front here: a corner that has come through from behind has, by itself, no way to
+//! tell which side it belongs on, where a convex shape has its centre. Surfaces of which one is wholly inside the other
+//! have no features near each other and touch nothing. The points go through the same choice as those of a mesh with a
 //! convex shape (`mesh_points`).
 
 use super::mesh_points::{Candidate, Candidates, NO_FACET, position_number};
@@ -60,17 +62,19 @@ pub(super) fn collide((a, b): (Surface<'_>, Surface<'_>), pose: &Pose, margin: R
             break;
         }
     }
-    let mut deepest: Option<Candidate> = None;
+    let mut materials = [[0; 2]; 4];
+    let many = a.has_materials() || b.has_materials();
     candidates.choose(|c| {
-        if deepest.is_none_or(|best| c.separation < best.separation) {
-            deepest = Some(*c);
+        if many {
+            let on_b = inverse.transform_point(c.position + c.normal * c.separation);
+            let found = [material_at(a, c.position, scale), material_at(b, on_b, scale)];
+            materials[manifold.points().len() & 3] = found;
         }
         let normal = c.normal * (1.0 / c.normal.length());
         manifold.push(ManifoldPoint { point1: c.position, normal, separation: c.separation, feature: c.feature });
     });
-    if let Some(c) = deepest {
-        let on_b = inverse.transform_point(c.position + c.normal * c.separation);
-        manifold.set_materials([material_at(a, c.position, scale), material_at(b, on_b, scale)]);
+    if many {
+        manifold.set_point_materials(&materials);
     }
 }
 

@@ -12,5 +12,6 @@ pub mod ray;
 pub use cast::ShapeCast;
 pub(crate) use convex_ray::{cast_cone, cast_cylinder, cast_support};
 pub use pair::{ShapeDistance, distance, overlaps};
+pub(crate) use ray::cast_placed;
 pub use ray::{Ray, ShapeHit, cast_ray};
 pub(crate) use ray::{cast_capsule, cast_cuboid, cast_planes, cast_sphere};

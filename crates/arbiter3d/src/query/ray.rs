@@ -87,6 +87,17 @@ pub(crate) struct PartHit {
     pub triangle: Option<u32>,
 }
 
+/// As [`cast_ray`], with the shape placed by `pose` in the frame of the ray.
+pub(crate) fn cast_placed(shape: &Shape, pose: &Pose, ray: &Ray) -> Option<ShapeHit> {
+    let local = Ray {
+        origin: pose.inverse_transform_point(ray.origin),
+        direction: pose.rotation.inverse_rotate(ray.direction),
+        ..*ray
+    };
+    let hit = cast_ray(shape, &local)?;
+    Some(ShapeHit { normal: pose.rotation.rotate(hit.normal), ..hit })
+}
+
 /// As [`cast_ray`], with the part.
 #[inline]
 pub(crate) fn find(shape: &Shape, ray: &Ray) -> Option<PartHit> {

@@ -36,13 +36,17 @@ pub struct CompoundChild {
     pub rotation: Quat,
     /// How many times as dense it is as the shape definition says, zero or more. Default 1.
     pub density_factor: Real,
+    /// Which of [`ShapeDefinition::palette`](crate::ShapeDefinition::palette) its surface is; the material of the shape
+    /// definition for numbers past the palette's end. A mesh, height field or voxel grid with materials of its own keeps
+    /// those that are not zero. Default 0.
+    pub material: u8,
 }
 
 impl CompoundChild {
     /// A shape at the origin of the compound.
     #[must_use]
     pub fn new(shape: Shape) -> Self {
-        Self { shape, position: Vec3::ZERO, rotation: Quat::IDENTITY, density_factor: 1.0 }
+        Self { shape, position: Vec3::ZERO, rotation: Quat::IDENTITY, density_factor: 1.0, material: 0 }
     }
 
     /// The same, its frame at a position in the compound, metres.
@@ -63,6 +67,12 @@ impl CompoundChild {
         Self { density_factor, ..self }
     }
 
+    /// The same with another material of the palette.
+    #[must_use]
+    pub fn with_material(self, material: u8) -> Self {
+        Self { material, ..self }
+    }
+
     pub(crate) fn pose(&self) -> Pose {
         Pose::new(self.position, Rotation::from_quat(self.rotation))
     }
@@ -70,7 +80,21 @@ impl CompoundChild {
 
 /// One shape made of many placed ones, for bodies of any kind. It is baked: to change a child, build a new one.
 ///
-/// The whole has one material, one filter and one arbiter with each shape that it meets.
+/// The whole has one filter and one arbiter with each shape that it meets. Each child may have a material of its own: a
+/// hammer with an iron head and a slippery handle is one compound. Where several children touch the same shape, contacts of
+/// different materials are solved apart, up to two in an arbiter: that of the deepest contact, and that of the deepest of
+/// the others.
+///
+/// ```
+/// use arbiter3d::{CompoundChild, Material, Shape, ShapeDefinition, math::Vec3};
+/// let handle = CompoundChild::new(Shape::capsule(0.3, 0.02)?).with_density_factor(0.7).with_material(0);
+/// let head = Shape::cuboid(Vec3::new(0.03, 0.03, 0.1))?;
+/// let head = CompoundChild::new(head).at(Vec3::Y * 0.3).with_density_factor(7.8).with_material(1);
+/// let wood = Material { friction: 0.2, ..Material::default() };
+/// let iron = Material { friction: 0.6, restitution: 0.4, ..Material::default() };
+/// let hammer = ShapeDefinition::new(Shape::compound(&[handle, head])?).palette(vec![wood, iron]);
+/// # Ok::<(), arbiter3d::ShapeError>(())
+/// ```
 ///
 /// ```
 /// use arbiter3d::{CompoundChild, Shape, math::Vec3};
@@ -88,6 +112,8 @@ pub struct Compound {
     tree: MeshTree,
     unit_mass: Result<MassProperties, ShapeError>,
     inner_ball: (Vec3, Real),
+    /// Materials with round children, each with the largest radius of those.
+    rounded: Vec<(u8, Real)>,
 }
 
 /// Where a child is.
@@ -115,6 +141,7 @@ impl Compound {
                         position: pose.position,
                         rotation: pose.rotation.to_quat(),
                         density_factor: given.density_factor * grandchild.density_factor,
+                        material: if grandchild.material == 0 { given.material } else { grandchild.material },
                     }
                 })),
                 _ => flat.push(given.clone()),
@@ -140,8 +167,18 @@ impl Compound {
                 inner_ball = (child.pose().transform_point(center), radius);
             }
         }
+        let mut rounded: Vec<(u8, Real)> = Vec::new();
+        for child in &children {
+            let radius = child.shape.rounding_radius();
+            match rounded.iter_mut().find(|(material, _)| *material == child.material) {
+                Some((_, largest)) => *largest = max(*largest, radius),
+                None if radius > 0.0 => rounded.push((child.material, radius)),
+                None => {}
+            }
+        }
         Self {
             unit_mass: sum_of_masses(&children),
+            rounded,
             placed: order.iter().map(|&at| unsorted[at as usize]).collect(),
             children,
             tree,
@@ -153,6 +190,19 @@ impl Compound {
     #[must_use]
     pub fn children(&self) -> &[CompoundChild] {
         &self.children
+    }
+
+    /// The largest radius with which children of a material roll.
+    pub(crate) fn rounding_of(&self, material: u8) -> Real {
+        self.rounded.iter().find(|(of, _)| *of == material).map_or(0.0, |(_, radius)| *radius)
+    }
+
+    /// Which material of the palette a child has where its own shape has the material `own`.
+    pub(crate) fn child_material(&self, child: usize, own: u8) -> u8 {
+        match (own, self.children.get(child)) {
+            (0, Some(child)) => child.material,
+            _ => own,
+        }
     }
 
     /// The first child along a ray in the frame of the compound, and where the ray meets it.
@@ -184,7 +234,8 @@ impl Compound {
             let pose = child.pose();
             let turned = linear * pose.rotation.to_mat3();
             let shape = child.shape.transformed(turned, linear * pose.position + translation)?;
-            Ok(CompoundChild { density_factor: child.density_factor, ..CompoundChild::new(shape) })
+            let CompoundChild { density_factor, material, .. } = *child;
+            Ok(CompoundChild { density_factor, material, ..CompoundChild::new(shape) })
         };
         self.children.iter().map(map).collect::<Result<Vec<_>, _>>().map(Self::bake)
     }

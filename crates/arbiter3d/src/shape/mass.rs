@@ -264,6 +264,51 @@ mod tests {
         }
     }
 
+    /// Kinds with a formula, to 1e-5: mass, height of the centre, and the inertia about x, y and z there.
+    #[test]
+    fn masses_are_those_of_the_formulas() {
+        const PI: f64 = std::f64::consts::PI;
+        let (h, r) = (0.6, 0.3);
+        let (a, b, c) = (0.3, 0.5, 0.7);
+        let ball = 4.0 / 3.0 * PI * r * r * r;
+        let tube = 2.0 * PI * r * r * h;
+        let across = tube * (r * r / 4.0 + h * h / 3.0);
+        let cone = tube / 3.0;
+        let box_of = |m: f64| [m * (b * b + c * c) / 3.0, m * (a * a + c * c) / 3.0, m * (a * a + b * b) / 3.0];
+        let (egg, brick) = (4.0 / 3.0 * PI * a * b * c, 8.0 * a * b * c);
+        let egg_inertia = box_of(egg).map(|i| i * 0.6);
+        let ends = ball * (0.4 * r * r + h * h + 0.75 * h * r);
+        let capsule_inertia = [across + ends, (tube / 2.0 + 0.4 * ball) * r * r, across + ends];
+        let cone_across = cone * (0.15 * r * r + 0.15 * h * h);
+        let half = Vec3::new(a as Real, b as Real, c as Real);
+        let corners = [-1.0, 1.0].map(|x| [-1.0, 1.0].map(|y| [-1.0, 1.0].map(|z| half * Vec3::new(x, y, z)))).concat();
+        let [h32, r32] = [h as Real, r as Real];
+        let slim = Shape::capsule(h32, 0.1);
+        let cases = [
+            (Shape::sphere(r32), ball, 0.0, [0.4 * ball * r * r; 3]),
+            (Shape::cylinder(h32, r32), tube, 0.0, [across, 0.5 * tube * r * r, across]),
+            (Shape::capsule(h32, r32), tube + ball, 0.0, capsule_inertia),
+            (Shape::rounded(&slim.unwrap(), 0.2), tube + ball, 0.0, capsule_inertia),
+            (Shape::tapered_capsule(h32, r32, r32), tube + ball, 0.0, capsule_inertia),
+            (Shape::cone(h32, r32), cone, -0.5 * h, [cone_across, 0.3 * cone * r * r, cone_across]),
+            (Shape::ellipsoid(half), egg, 0.0, egg_inertia),
+            (Shape::sphere(1.0).unwrap().scaled(half), egg, 0.0, egg_inertia),
+            (Shape::cuboid(half), brick, 0.0, box_of(brick)),
+            (Shape::hull(&corners.concat()), brick, 0.0, box_of(brick)),
+        ];
+        for (shape, mass, height, inertia) in cases {
+            let shape = shape.unwrap();
+            let found = shape.mass_properties(1.0).unwrap();
+            let near =
+                |x: Real, y: f64, scale: f64| assert!((f64::from(x) - y).abs() < 1e-5 * scale, "{shape:?}: {x} {y}");
+            near(found.mass, mass, mass);
+            near(found.center.y, height, h);
+            for (x, y) in [found.inertia.xx, found.inertia.yy, found.inertia.zz].into_iter().zip(inertia) {
+                near(x, y, y);
+            }
+        }
+    }
+
     /// A tapered capsule, cut into thin discs.
     #[test]
     fn a_tapered_capsule_has_the_mass_of_its_slices() {

@@ -65,7 +65,18 @@ impl Facet {
     }
 }
 
-/// A triangle mesh for static and kinematic bodies.
+/// A triangle mesh, for static and kinematic bodies, and, if it is closed, for dynamic ones.
+///
+/// A mesh is its surface. What this means where it meets other shapes:
+///
+/// - A convex shape is pushed to the front of each triangle that it is in front of with its centre, by a two-sided mesh
+///   also to the back. One that lies wholly inside a closed mesh touches nothing as long as no triangle is near.
+/// - Another mesh, or a height field, is pushed to the front, also by two-sided meshes: give meshes that are to push each other
+///   triangles that wind counter-clockwise seen from outside. Sheets that are open on both sides hold convex shapes, and
+///   meshes from the front alone.
+/// - A mesh wholly inside another, with no triangles near each other, touches nothing: neither contacts nor the events of a
+///   sensor come of it. Where sensors have to see what is inside, make them of convex shapes or a compound of those
+///   (`TriangleMesh::convex_decomposition`, with the feature `decomposition`).
 ///
 /// ```
 /// use arbiter3d::{TriangleMesh, math::Vec3};

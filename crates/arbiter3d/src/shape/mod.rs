@@ -635,12 +635,35 @@ impl Shape {
         }
     }
 
-    /// Which material of the palette a triangle of a mesh or a height field has, by the number that the user knows it by.
-    pub(crate) fn triangle_material(&self, triangle: u32) -> u8 {
-        match self {
-            Self::Mesh(mesh) => mesh.materials().get(triangle as usize).copied().unwrap_or(0),
-            Self::HeightField(field) => field.material(triangle as usize),
+    /// Which material of the palette a part of the surface has: a child of a compound and a triangle of a mesh or a height
+    /// field by the numbers that the user knows them by, a cell of voxels by a point on it and the normal there.
+    pub(crate) fn part_material(
+        &self,
+        (child, triangle): (Option<u32>, Option<u32>),
+        (point, normal): (Vec3, Vec3),
+    ) -> u8 {
+        match (self, triangle) {
+            (Self::Mesh(mesh), Some(triangle)) => mesh.materials().get(triangle as usize).copied().unwrap_or(0),
+            (Self::HeightField(field), Some(triangle)) => field.material(triangle as usize),
+            (Self::Voxels(grid), _) => grid.material_under(point, normal),
+            (Self::Compound(compound), _) => {
+                let number = child.map_or(usize::MAX, |child| child as usize);
+                let own = compound.children().get(number).map_or(0, |child| {
+                    let pose = child.pose();
+                    let there = (pose.inverse_transform_point(point), pose.rotation.inverse_rotate(normal));
+                    child.shape.part_material((None, triangle), there)
+                });
+                compound.child_material(number, own)
+            }
             _ => 0,
+        }
+    }
+
+    /// The radius with which parts of a material roll.
+    pub(crate) fn part_rounding(&self, material: u8) -> Real {
+        match self {
+            Self::Compound(compound) => compound.rounding_of(material),
+            _ => self.rounding_radius(),
         }
     }
 

@@ -22,6 +22,10 @@ use std::sync::Arc;
 
 /// Cells along each side of a chunk.
 const SIDE: i32 = 8;
+/// Cells of a chunk.
+const CELLS: usize = (SIDE * SIDE * SIDE) as usize;
+/// How far under its surface, in cells, a cell is looked for.
+const UNDER: Real = 0.01;
 /// Largest coordinate of a cell: their corners are whole numbers of cells in single precision.
 const FARTHEST: i32 = 1 << 20;
 
@@ -46,6 +50,8 @@ pub struct VoxelGrid {
     aabb: Aabb,
     unit_mass: Result<MassProperties, ShapeError>,
     inner_ball: (Vec3, Real),
+    /// Of chunks with a cell whose material is not zero: that of each cell, layer by layer along y, in each row by row along z.
+    materials: BTreeMap<[i32; 3], Arc<[u8; CELLS]>>,
 }
 
 /// 8 × 8 × 8 cells.
@@ -80,6 +86,12 @@ fn locate([x, y, z]: [i32; 3]) -> ([i32; 3], usize, u64) {
     let chunk = [z, y, x].map(|c| c.div_euclid(SIDE));
     let [x, y, z] = [x, y, z].map(|c| c.rem_euclid(SIDE) as usize);
     (chunk, y, 1 << (8 * z + x))
+}
+
+/// Coordinates of the chunk of a cell, and which of its cells it is.
+fn place_in_chunk([x, y, z]: [i32; 3]) -> ([i32; 3], usize) {
+    let [cx, cy, cz] = [x, y, z].map(|c| c.rem_euclid(SIDE));
+    ([z, y, x].map(|c| c.div_euclid(SIDE)), ((cy * SIDE + cz) * SIDE + cx) as usize)
 }
 
 impl Chunk {
@@ -157,6 +169,47 @@ impl VoxelGrid {
         Self::finish(cell_size, chunks.into_iter().map(bake).collect())
     }
 
+    /// The same grid with other materials: of some cells, solid or not, which of
+    /// [`ShapeDefinition::palette`](crate::ShapeDefinition::palette). Cells that are not named keep theirs, at first 0.
+    ///
+    /// ```
+    /// use arbiter3d::VoxelGrid;
+    /// let rock = VoxelGrid::new(0.5, [[0, 0, 0], [1, 0, 0]])?;
+    /// let with_ore = rock.with_materials(&[([1, 0, 0], 3)])?;
+    /// assert_eq!((with_ore.material([0, 0, 0]), with_ore.material([1, 0, 0])), (0, 3));
+    /// # Ok::<(), arbiter3d::ShapeError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// If a cell has a coordinate beyond ±2²⁰.
+    pub fn with_materials(&self, changes: &[([i32; 3], u8)]) -> Result<Self, ShapeError> {
+        let mut changed = self.clone();
+        for &(cell, material) in changes {
+            check(cell)?;
+            let (chunk, at) = place_in_chunk(cell);
+            if material != changed.material(cell) {
+                let cells = changed.materials.entry(chunk).or_insert_with(|| Arc::new([0; CELLS]));
+                Arc::make_mut(cells)[at] = material;
+            }
+        }
+        Ok(changed)
+    }
+
+    /// Which material of the palette a cell has.
+    #[must_use]
+    pub fn material(&self, cell: [i32; 3]) -> u8 {
+        let (chunk, at) = place_in_chunk(cell);
+        self.materials.get(&chunk).map_or(0, |cells| cells[at])
+    }
+
+    /// The material of the cell that a point on the surface belongs to; `normal` points outwards there.
+    pub(crate) fn material_under(&self, point: Vec3, normal: Vec3) -> u8 {
+        if self.materials.is_empty() {
+            return 0;
+        }
+        self.material(self.cell_at(point - normal * (UNDER * self.cell_size)))
+    }
+
     /// The same grid with some cells made solid (`true`) or empty (`false`), the last word on a cell counting. Costs the
     /// chunks of 8 × 8 × 8 cells that change, and a look at every chunk.
     ///
@@ -187,7 +240,8 @@ impl VoxelGrid {
                 Arc::make_mut(chunk).bake(at);
             }
         }
-        Self::finish(self.cell_size, chunks)
+        let changed = Self::finish(self.cell_size, chunks)?;
+        Ok(Self { materials: self.materials.clone(), ..changed })
     }
 
     fn finish(cell_size: Real, chunks: BTreeMap<[i32; 3], Arc<Chunk>>) -> Result<Self, ShapeError> {
@@ -211,7 +265,7 @@ impl VoxelGrid {
         let scale = glam::DMat3::from_diagonal(DVec3::splat(cell_size.into()));
         let no_volume = ShapeError::NoVolume { shape: "the voxel grid", advice: "use larger or smaller cells" };
         let unit_mass = sum.map(&scale, DVec3::ZERO).unit_mass().ok_or(no_volume);
-        Ok(Self { cell_size, chunks, solid, aabb, unit_mass, inner_ball })
+        Ok(Self { cell_size, chunks, solid, aabb, unit_mass, inner_ball, materials: BTreeMap::new() })
     }
 
     /// Length of a cell, metres.

@@ -94,6 +94,7 @@ impl Record {
         let data = &arbiter.data;
         let states = [arbiter.body1, arbiter.body2].map(|body| &bodies.states[body.index as usize]);
         let extra = data.restitution > 0.0
+            || data.other_slots != 0 && data.other_restitution > 0.0
             || data.rolling_resistance > 0.0
             || data.tangent_velocity != Vec3::ZERO
             || data.flags & ANISOTROPIC != 0
@@ -114,7 +115,7 @@ impl Record {
     }
 }
 
-/// Splits the slots of an arbiter into groups of equal normal and mode; each is a row.
+/// Splits the slots of an arbiter into groups of equal normal, mode and material; each is a row.
 fn rows_of(data: &ContactData) -> u16 {
     let mut left = if data.flags & HIDDEN == 0 { data.usage_mask & 15 } else { 0 };
     let (mut rows, mut count) = (0, 0);
@@ -123,7 +124,9 @@ fn rows_of(data: &ContactData) -> u16 {
         let mut slots = 0;
         for slot in 0..SLOTS {
             let contact = &data.slots[slot];
-            let same = contact.remove == lead.remove && contact.normal == lead.normal;
+            let same = contact.remove == lead.remove
+                && contact.normal == lead.normal
+                && data.is_other(1 << slot) == data.is_other(left & left.wrapping_neg());
             slots |= u8::from(same && left >> slot & 1 == 1) << slot;
         }
         // A normal that is not equal to itself cannot occur (validated), but must not loop.

@@ -95,9 +95,13 @@ pub(crate) fn prepare_row<W: Lanes<L>, const L: usize, const P: usize, const C: 
         align_tangents(row, friction, extra, sources, context);
     }
     prepare_friction(row, friction, &gathered, &separations, context.speculative_distance);
+    if let Some(extra) = extra.as_deref().filter(|_| features.anisotropic) {
+        align_levers(row, friction, &extra.ratio, &gathered);
+    }
     let mut coefficients = [0.0; L];
     for (lane, source) in sources.iter().enumerate().take(L) {
-        coefficients[lane] = context.arbiters[source.arbiter as usize].data.friction;
+        let data = &context.arbiters[source.arbiter as usize].data;
+        coefficients[lane] = if data.is_other(source.slots) { data.other_friction } else { data.friction };
     }
     friction.friction = W::from_array(coefficients);
     if let Some(extra) = extra.filter(|_| features.any()) {
@@ -111,7 +115,7 @@ fn features_of(sources: &[RowSource], context: &PrepareContext<'_>) -> RowFeatur
     let mut features = RowFeatures::default();
     for source in sources {
         let data = &context.arbiters[source.arbiter as usize].data;
-        features.restitution |= data.restitution > 0.0;
+        features.restitution |= data.restitution > 0.0 || data.other_slots != 0 && data.other_restitution > 0.0;
         features.rolling |= source.is_first() && data.rolling_resistance > 0.0;
         features.conveyor |= data.tangent_velocity != Vec3::ZERO;
         features.anisotropic |= data.flags & ANISOTROPIC != 0;
@@ -431,6 +435,26 @@ fn align_tangents<W: Lanes<L>, const L: usize, const P: usize, const C: usize>(
     }
 }
 
+/// Levers of the twist of anisotropic lanes: a point at `(a, b)` from the friction centre, `a` along the direction in which
+/// friction is `ratio` times that across, slides along `(−b, a)` when the bodies twist, where the ellipse of friction gives
+/// way at `μ √((ratio b)² + a²) / √(a² + b²)`.
+#[inline(always)]
+fn align_levers<W: Lanes<L>, const L: usize, const P: usize, const C: usize>(
+    row: &NormalRow<W, L, P, C>,
+    friction: &mut FrictionRow<W, P>,
+    ratio: &W,
+    gathered: &Gathered<W, P>,
+) {
+    let t1 = friction.tangent1;
+    let t2 = row.normal.cross(&t1);
+    for i in 0..P {
+        let away = gathered.r1[i] - friction.lever1;
+        let (a, b) = (away.dot(&t1), *ratio * away.dot(&t2));
+        let lever = (a * a + b * b).sqrt() * gathered.present[i];
+        friction.levers[i] = ratio.if_positive(lever, friction.levers[i]);
+    }
+}
+
 /// Part along the surface that a direction of friction has to have: less than 0.6° off the normal it tells nothing.
 const LEAST_PART_ALONG: Real = 0.01;
 
@@ -447,7 +471,8 @@ fn prepare_extra<W: Lanes<L>, const L: usize, const P: usize, const C: usize>(
     let t2 = row.normal.cross(&t1);
     for (lane, source) in sources.iter().enumerate().take(L) {
         let data = &context.arbiters[source.arbiter as usize].data;
-        extra.restitution.set(lane, data.restitution);
+        let other = data.is_other(source.slots);
+        extra.restitution.set(lane, if other { data.other_restitution } else { data.restitution });
         extra.target1.set(lane, data.tangent_velocity.dot(t1.get(lane)));
         extra.target2.set(lane, data.tangent_velocity.dot(t2.get(lane)));
         if source.is_first() && data.rolling_resistance > 0.0 {

@@ -249,7 +249,7 @@ impl World {
                 friction = max(friction, shape.material.friction);
                 restitution = max(restitution, shape.material.restitution);
                 let resistance = shape.material.rolling_resistance;
-                rolling = max(resistance * rolling_radius([&shape.geometry; 2], [resistance; 2]), rolling);
+                rolling = max(resistance * rolling_radius([(&shape.geometry, 0); 2], [&shape.material; 2]), rolling);
                 any = true;
             }
         }
@@ -295,10 +295,14 @@ pub(crate) fn fresh_data() -> ContactData {
 pub(crate) fn mix_shape_materials(pair: &mut Pair, data: &mut ContactData, shapes: &[ShapeSlot], bodies: &[Body]) {
     let [a, b] = pair.shapes.map(|slot| &shapes[slot as usize]);
     let (ma, mb) = (a.surface(pair.materials[0]), b.surface(pair.materials[1]));
-    let friction = ma.friction_combine.max(mb.friction_combine).combine(ma.friction, mb.friction);
-    let restitution = ma.restitution_combine.max(mb.restitution_combine).combine(ma.restitution, mb.restitution);
+    let (friction, restitution) = grip_and_bounce(ma, mb);
+    let (other_friction, other_restitution) = if pair.other_materials == pair.materials {
+        (friction, restitution)
+    } else {
+        grip_and_bounce(a.surface(pair.other_materials[0]), b.surface(pair.other_materials[1]))
+    };
     let rolling = max(ma.rolling_resistance, mb.rolling_resistance)
-        * rolling_radius([&a.geometry, &b.geometry], [ma, mb].map(|m| m.rolling_resistance));
+        * rolling_radius([(&a.geometry, pair.materials[0]), (&b.geometry, pair.materials[1])], [ma, mb]);
     pair.conveyor = ma.turns() || mb.turns();
     let free = |flag: u8| data.flags & flag == 0;
     let (f, r, t, o) = (
@@ -308,10 +312,10 @@ pub(crate) fn mix_shape_materials(pair: &mut Pair, data: &mut ContactData, shape
         free(ROLLING_OVERRIDDEN),
     );
     if f {
-        data.friction = friction;
+        (data.friction, data.other_friction) = (friction, other_friction);
     }
     if r {
-        data.restitution = restitution;
+        (data.restitution, data.other_restitution) = (restitution, other_restitution);
     }
     if t {
         data.tangent_velocity = surface_velocity([ma, mb], pair.bodies.map(|body| bodies[body as usize].pose.rotation));
@@ -322,6 +326,12 @@ pub(crate) fn mix_shape_materials(pair: &mut Pair, data: &mut ContactData, shape
     if pair.conveyor || data.flags & ANISOTROPIC != 0 {
         turn_anisotropy([a, b], [ma, mb], pair.bodies.map(|body| bodies[body as usize].pose.rotation), data);
     }
+}
+
+/// Friction and restitution of two materials.
+fn grip_and_bounce(a: &Material, b: &Material) -> (Real, Real) {
+    let friction = a.friction_combine.max(b.friction_combine).combine(a.friction, b.friction);
+    (friction, a.restitution_combine.max(b.restitution_combine).combine(a.restitution, b.restitution))
 }
 
 /// Direction and ratio of the anisotropic friction of an arbiter, if users have not set them: of the two materials that
@@ -354,11 +364,16 @@ pub(crate) fn surface_velocity(materials: [&Material; 2], rotations: [Rotation; 
     a - b
 }
 
-/// Radius that rolls: that of the round shape, or for polyhedra with a resistance of their own a quarter of the inner radius.
-fn rolling_radius(shapes: [&Shape; 2], resistances: [Real; 2]) -> Real {
-    let round = max(shapes[0].rounding_radius(), shapes[1].rounding_radius());
-    let set = resistances.iter().any(|&r| r > Material::DEFAULT_ROLLING_RESISTANCE);
-    if round > 0.0 || !set { round } else { 0.25 * max(shapes[0].inner_radius(), shapes[1].inner_radius()) }
+/// Radius that rolls: that of the round shape, or for compounds and polyhedra with a resistance of their own that of the round
+/// child with the material that touches, or a quarter of the inner radius.
+fn rolling_radius([a, b]: [(&Shape, u8); 2], materials: [&Material; 2]) -> Real {
+    let round = max(a.0.rounding_radius(), b.0.rounding_radius());
+    let set = materials.iter().any(|m| m.rolling_resistance > Material::DEFAULT_ROLLING_RESISTANCE);
+    if round > 0.0 || !set {
+        return round;
+    }
+    let round = max(a.0.part_rounding(a.1), b.0.part_rounding(b.1));
+    if round > 0.0 { round } else { 0.25 * max(a.0.inner_radius(), b.0.inner_radius()) }
 }
 
 fn validate_point(contact: &ContactPoint) -> Result<(), Error> {

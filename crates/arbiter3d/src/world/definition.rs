@@ -428,9 +428,12 @@ pub struct ShapeDefinition {
     pub density: Real,
     /// The surface.
     pub material: Material,
-    /// Materials of the triangles of a mesh or the cells of a height field, by the numbers that these were given
-    /// ([`TriangleMesh::with_materials`](crate::TriangleMesh::with_materials)); `material` for numbers past the end. Where a
-    /// body touches several, that of the deepest contact counts. Default empty: all of it is of `material`.
+    /// Materials of the triangles of a mesh, the cells of a height field or of voxels, the children of a compound, by the
+    /// numbers that these were given ([`TriangleMesh::with_materials`](crate::TriangleMesh::with_materials),
+    /// [`CompoundChild::with_material`](crate::CompoundChild::with_material), …); `material` for numbers past the end. Where a
+    /// body touches two, each contact has the friction and restitution of its own; of more, all but that of the deepest
+    /// contact count as the second deepest. Rolling resistance, surface velocity and anisotropy are those of the deepest
+    /// contact. Default empty: all of it is of `material`.
     pub palette: Vec<Material>,
     /// Which shapes it meets.
     pub filter: Filter,
@@ -509,7 +512,7 @@ impl ShapeDefinition {
         Self { filter, ..self }
     }
 
-    /// The same with materials for the numbers of its triangles or cells.
+    /// The same with materials for the numbers of its triangles, cells or children.
     #[must_use]
     pub fn palette(self, palette: Vec<Material>) -> Self {
         Self { palette, ..self }

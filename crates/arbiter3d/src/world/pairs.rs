@@ -58,6 +58,8 @@ pub(crate) struct Pair {
     pub cache: PairCache,
     /// Which materials of their palettes the two shapes touch with.
     pub materials: [u8; 2],
+    /// Those of contacts that are of others: equal to `materials` where there are none.
+    pub other_materials: [u8; 2],
 }
 
 /// Traits that are those of [`super::definition::ContactEvents`].
@@ -289,6 +291,7 @@ impl PairMaker<'_> {
             apart_rotation: self.speculative_distance / (8.0 * min(slots[0].reach, slots[1].reach)),
             cache: PairCache::default(),
             materials: [0; 2],
+            other_materials: [0; 2],
         };
         pair.note_borne(bodies.map(|body| self.states[body as usize].moves != 0));
         pair

@@ -1,6 +1,8 @@
 //! Short words for the behaviour tests: worlds, grounds, bodies, random numbers, measurements.
 #![allow(dead_code)] // every test file uses its own part
 
+pub mod floors;
+
 use arbiter3d::math::{Quat, Vec3};
 use arbiter3d::{BodyDefinition, BodyId, Shape, ShapeDefinition, ShapeId, World, WorldSettings};
 

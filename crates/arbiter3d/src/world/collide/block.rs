@@ -346,8 +346,9 @@ impl<W: Lanes<L>, const L: usize> BlockKernel<'_, W, L> {
             }
             return;
         }
-        if pair.materials != manifold.materials() && !manifold.points().is_empty() {
-            self.change_materials(fresh.pair, manifold.materials());
+        let touching = (manifold.materials(), manifold.other_materials().0);
+        if (pair.materials, pair.other_materials) != touching && !manifold.points().is_empty() {
+            self.change_materials(fresh.pair, touching);
         }
         let pair = self.pairs.shared(fresh.pair);
         let places = Places::of_manifold(&manifold, &PairFrame::new(pair, context.shapes, context.solver));
@@ -356,10 +357,10 @@ impl<W: Lanes<L>, const L: usize> BlockKernel<'_, W, L> {
 
     /// Other parts of the surfaces touch than before.
     #[cold]
-    fn change_materials(&mut self, index: u32, materials: [u8; 2]) {
+    fn change_materials(&mut self, index: u32, materials: ([u8; 2], [u8; 2])) {
         let context = self.context;
         let (pair, arbiter) = self.pairs.pair_and_arbiter(index);
-        pair.materials = materials;
+        (pair.materials, pair.other_materials) = materials;
         if let Some(arbiter) = arbiter {
             mix_shape_materials(pair, &mut arbiter.data, context.shapes, context.bodies);
         }

@@ -10,10 +10,13 @@
 use super::super::pairs::Pair;
 use super::super::shapes::ShapeSlot;
 use crate::arbiter::{Contact, ContactData, HIDDEN, ONE_NORMAL, SLOTS, SolveMode};
-use crate::math::{Pose, Real, Rotation, Vec3};
+use crate::math::{Pose, Real, Rotation, Vec3, min};
 use crate::narrow_phase::{Manifold, ManifoldPoint, WideManifold};
 use crate::simd::{LanePose, LaneRotation, LaneVec3, Lanes, Number, Quad};
 use crate::solver::SolverBodies;
+
+/// Least cosine between normals of points of which one takes over the load of another.
+const GOES_ON: Real = 0.99;
 
 /// Where a contact is: what a new manifold changes of it.
 #[derive(Clone, Copy, Debug)]
@@ -48,10 +51,12 @@ impl Place {
 pub(super) struct Places {
     pub points: [Place; SLOTS],
     pub count: usize,
+    /// A bit for each point of the second pair of materials.
+    pub others: u8,
 }
 
 impl Places {
-    pub const NONE: Self = Self { points: [Place::NOWHERE; SLOTS], count: 0 };
+    pub const NONE: Self = Self { points: [Place::NOWHERE; SLOTS], count: 0, others: 0 };
 
     /// Those of a manifold in the frame of shape 1.
     pub fn of_manifold(manifold: &Manifold, frame: &PairFrame) -> Self {
@@ -60,6 +65,7 @@ impl Places {
             *place = frame.place(point);
         }
         places.count = manifold.points().len();
+        places.others = manifold.other_materials().1;
         places
     }
 }
@@ -190,14 +196,20 @@ pub(super) fn turn_levers(data: &mut ContactData, rotations: [Rotation; 2]) {
 /// Replaces the contacts of an arbiter by those of a new manifold; points that were there before keep their slot and
 /// impulses.
 ///
-/// A point is the same when its features are; else when an old one not yet taken is within the break distance. `rotations`
-/// are those of the bodies.
+/// A point is the same when its features are; else when an old one not yet taken is within the break distance on either body:
+/// the corner of a box that slides on stays that corner, whatever part of the floor it passes to. `rotations` are those of the
+/// bodies.
 pub(super) fn update_contacts(data: &mut ContactData, places: &Places, rotations: [Rotation; 2], break_distance: Real) {
     data.rotations = rotations;
     let points = &places.points[..places.count.min(SLOTS)];
     let mut matches = match_slots(data, points, break_distance);
     let mut used: u8 = matches.iter().filter(|&&slot| slot < SLOTS).fold(0, |mask, &slot| mask | 1 << slot);
-    let mut one_normal = true;
+    let left = ((data.usage_mask & 15) | data.usage_mask >> 4) & !used;
+    let mut loads = [0.0; SLOTS];
+    for (i, place) in points.iter().enumerate().filter(|(i, _)| matches[*i] == SLOTS) {
+        loads[i] = passed_on(data, left, place, (points, &matches));
+    }
+    let (mut one_normal, mut others) = (true, 0);
     for (i, place) in points.iter().enumerate() {
         let kept = matches[i] < SLOTS;
         if !kept {
@@ -210,11 +222,28 @@ pub(super) fn update_contacts(data: &mut ContactData, places: &Places, rotations
             contact.tangent_impulse -= place.normal * place.normal.dot(contact.tangent_impulse);
         } else {
             contact.reset_impulses();
+            contact.normal_impulse = loads[i];
         }
         one_normal &= place.normal == points[0].normal;
+        others |= (places.others >> i & 1) << matches[i];
     }
+    data.other_slots = others;
+    one_normal &= others == 0;
     data.usage_mask = data.usage_mask & 0xf0 | used;
     data.flags = data.flags & !(ONE_NORMAL | HIDDEN) | if one_normal { ONE_NORMAL } else { 0 };
+}
+
+/// What a new point that touches takes over of points that are no more, in the slots of the bit mask `left`: of what slides or
+/// rolls, the load goes on though other points bear it.
+fn passed_on(data: &ContactData, left: u8, point: &Place, (points, matches): (&[Place], &[usize; SLOTS])) -> Real {
+    if left == 0 || point.separation > 0.0 {
+        return 0.0;
+    }
+    let alike = |normal: Vec3| normal.dot(point.normal) > GOES_ON;
+    let heirs = |i: &usize| matches[*i] == SLOTS && points[*i].separation <= 0.0 && alike(points[*i].normal);
+    let gone = |slot: &usize| left >> slot & 1 == 1 && alike(data.slots[*slot].normal);
+    let load = (0..SLOTS).filter(gone).fold(0.0, |sum, slot| sum + data.slots[slot].normal_impulse);
+    load / (0..points.len()).filter(heirs).count() as Real
 }
 
 /// The slot of the contact that each point goes on from, or [`SLOTS`].
@@ -236,7 +265,10 @@ fn match_slots(data: &ContactData, points: &[Place], break_distance: Real) -> [u
         return matches;
     }
     for (found, point) in matches.iter_mut().zip(points).filter(|(found, _)| **found == SLOTS) {
-        let near = |slot: usize| (old[slot].local_anchor1 - point.anchor1).length_squared();
+        let near = |slot: usize| {
+            let apart1 = (old[slot].local_anchor1 - point.anchor1).length_squared();
+            min(apart1, (old[slot].local_anchor2 - point.anchor2).length_squared())
+        };
         let mut best = break_distance * break_distance;
         for slot in (0..SLOTS).filter(|&slot| unclaimed >> slot & 1 == 1) {
             if near(slot) < best {

@@ -3,7 +3,7 @@
 //! After the narrow phase, a body with new contacts against such shapes is looked at if it has several of them, not all with
 //! one normal: each contact that another shape hides (see `narrow_phase::seam`) is left out of this step's solve. An arbiter
 //! all of whose contacts are hidden keeps them and is not solved, so that it goes on as long as the shapes touch; from one with
-//! others too, the hidden ones are taken. The manifold of either is made anew in the next step, whatever moves: so what was
+//! others too, the hidden ones are taken. One that bears with a normal that is a little off gets that of the surface. The manifold of either is made anew in the next step, whatever moves: so what was
 //! hidden comes back as soon as nothing hides it, and the other way round.
 //!
 //! Each body looks at its own arbiters alone, and decides on all before it changes any: order and threads do not matter.
@@ -14,9 +14,9 @@ use super::super::shapes::ShapeSlot;
 use crate::arbiter::{Arbiter, ContactData, HIDDEN, NONE, ONE_NORMAL, SLOTS};
 use crate::edge_lists::EdgeLists;
 use crate::math::{Pose, Real, Vec3};
-use crate::narrow_phase::{Patch, SeamCast as Cast, scale_of};
+use crate::narrow_phase::{Patch, SeamCast as Cast, Verdict, scale_of};
 use crate::parallel::{SharedSlice, StagePool};
-use crate::query::{Ray, ShapeHit};
+use crate::query::{Ray, ShapeHit, cast_placed};
 use crate::solver::SolverBodies;
 use crate::storage::FixedList;
 
@@ -56,15 +56,23 @@ struct Fixed<'a> {
     scale: Real,
 }
 
+/// What is wrong with the contacts of an arbiter, by slots.
+#[derive(Clone, Copy)]
+struct Found {
+    /// At seams.
+    hidden: u8,
+    /// With normals that are a little off this one, which points away from the fixed shape.
+    leaning: u8,
+    upright: Vec3,
+}
+
+impl Found {
+    const NOTHING: Self = Self { hidden: 0, leaning: 0, upright: Vec3::ZERO };
+}
+
 impl Fixed<'_> {
     fn cast(&self, ray: &Ray) -> Option<ShapeHit> {
-        let local = Ray {
-            origin: self.pose.inverse_transform_point(ray.origin),
-            direction: self.pose.rotation.inverse_rotate(ray.direction),
-            ..*ray
-        };
-        let hit = self.shape.geometry.geometry().cast_ray(&local)?;
-        Some(ShapeHit { normal: self.pose.rotation.rotate(hit.normal), ..hit })
+        cast_placed(&self.shape.geometry, &self.pose, ray)
     }
 
     /// The contacts in some slots with one normal.
@@ -119,16 +127,19 @@ impl SeamSearch<'_> {
         let mut list = FixedList::<Fixed<'_>, MOST>::new();
         self.list_fixed(body, &mut list);
         let list = list.as_slice();
-        let mut hidden = [0_u8; MOST];
+        let mut found = [Found::NOTHING; MOST];
         for at in 0..list.len() {
-            hidden[at] = self.hidden_slots(at, (list, &hidden));
+            found[at] = self.look_at(at, (list, &found));
         }
-        for (&hidden, fixed) in hidden.iter().zip(list).filter(|(hidden, _)| **hidden != 0) {
+        for (found, fixed) in found.iter().zip(list).filter(|(found, _)| found.hidden | found.leaning != 0) {
             // SAFETY: as above, and nothing else of this body's is borrowed now.
             let (pair, arbiter) =
                 unsafe { (self.pairs.get_mut(fixed.pair as usize), self.arbiters.get_mut(fixed.arbiter as usize)) };
-            let data = &mut arbiter.data;
+            let (data, hidden) = (&mut arbiter.data, found.hidden);
             pair.has_manifold = false;
+            for slot in (0..SLOTS).filter(|slot| found.leaning >> slot & 1 == 1) {
+                data.slots[slot].normal = if fixed.side == 0 { found.upright } else { -found.upright };
+            }
             (0..SLOTS).filter(|slot| hidden >> slot & 1 == 1).for_each(|slot| data.slots[slot].reset_impulses());
             if data.usage_mask & 15 & !hidden == 0 {
                 data.flags |= HIDDEN;
@@ -189,39 +200,51 @@ impl SeamSearch<'_> {
         })
     }
 
-    /// The slots of an arbiter whose contacts others hide; `hidden` are those of the arbiters before it. What is hidden hides
-    /// nothing, so that of several contacts that would hide each other one is left.
-    fn hidden_slots(&self, at: usize, (list, hidden): (&[Fixed<'_>], &[u8; MOST])) -> u8 {
+    /// What is wrong with the contacts of an arbiter; `found` is that of the arbiters before it. What is hidden hides nothing,
+    /// so that of several contacts that would hide each other one is left.
+    fn look_at(&self, at: usize, (list, before): (&[Fixed<'_>], &[Found; MOST])) -> Found {
         let fixed = &list[at];
-        let Some(data) = self.data(fixed) else { return 0 };
+        let Some(data) = self.data(fixed) else { return Found::NOTHING };
         let near = |other: &Fixed<'_>| other.own == fixed.own;
         let cast = |ray: &Ray| first_hit(list.iter().filter(|other| near(other)), ray);
-        let (mut left, mut own) = (own_slots(data), 0);
+        let own = |ray: &Ray| fixed.cast(ray);
+        let (mut left, mut found) = (own_slots(data), Found::NOTHING);
         while left != 0 {
             let members = alike(data, left);
             left &= !members;
             let patch = fixed.patch(data, members);
-            let mut others =
-                list.iter().zip(hidden).enumerate().filter(|(place, (other, _))| *place != at && near(other));
-            if others.any(|(_, (other, &hidden))| self.hides((other, hidden), &patch, (&cast, fixed.scale))) {
-                own |= members;
+            let others = list.iter().zip(before).enumerate().filter(|(place, (other, _))| *place != at && near(other));
+            let mut verdicts = others
+                .map(|(_, (other, found))| self.verdict((other, found.hidden), &patch, ((&cast, &own), fixed.scale)));
+            match verdicts.find(|verdict| *verdict != Verdict::Counts) {
+                Some(Verdict::Hidden) => found.hidden |= members,
+                Some(Verdict::Straightened(normal)) if found.leaning == 0 || found.upright == normal => {
+                    (found.leaning, found.upright) = (found.leaning | members, normal);
+                }
+                _ => {}
             }
         }
-        own
+        found
     }
 
-    /// Whether a bearing on a shape, of those not hidden themselves, shows that a contact with another is at a seam.
-    fn hides(&self, (other, hidden): (&Fixed<'_>, u8), patch: &Patch, (cast, scale): (Cast<'_>, Real)) -> bool {
-        let Some(data) = self.data(other) else { return false };
+    /// What a contact is beside the bearings on another shape, of those not hidden themselves.
+    fn verdict(
+        &self,
+        (other, hidden): (&Fixed<'_>, u8),
+        patch: &Patch,
+        (casts, scale): ((Cast<'_>, Cast<'_>), Real),
+    ) -> Verdict {
+        let Some(data) = self.data(other) else { return Verdict::Counts };
         let mut left = own_slots(data) & !hidden;
         while left != 0 {
             let members = alike(data, left);
             left &= !members;
-            if patch.is_hidden_by(&other.patch(data, members).bearing(), cast, scale) {
-                return true;
+            let verdict = patch.beside(&other.patch(data, members).bearing(), casts, scale);
+            if verdict != Verdict::Counts {
+                return verdict;
             }
         }
-        false
+        Verdict::Counts
     }
 }
 

@@ -240,8 +240,9 @@ impl World {
     /// The arbiter of two shapes with the contacts of their meeting, begun; `None` if a listener has removed it.
     fn impact_arbiter(&mut self, slots: [u32; 2], manifold: &Manifold) -> Option<ArbiterId> {
         let [s1, s2] = slots.map(|slot| &self.shapes[slot as usize]);
+        let [touched1, touched2] = manifold.materials();
         let (key, indices, materials) =
-            (ArbiterKey::of_shapes(s1.id, s2.id), [s1.body, s2.body], [s1.material, s2.material]);
+            (ArbiterKey::of_shapes(s1.id, s2.id), [s1.body, s2.body], [*s1.surface(touched1), *s2.surface(touched2)]);
         let (pose1, from_center) = (self.solver_bodies.masses[s1.body as usize].pose(), s1.from_center);
         let index = match self.arbiters.find(key) {
             Some(index) => index,

@@ -134,7 +134,7 @@ impl World {
             shape: shape.id,
             child: impact.child,
             triangle: impact.triangle,
-            material: self.material_at(slot, impact.child, impact.triangle),
+            material: self.material_at(slot, (impact.child, impact.triangle), (impact.point, impact.normal)),
             point: impact.point,
             normal: impact.normal,
             fraction: impact.fraction,

@@ -22,7 +22,7 @@ pub use rays::RayHit;
 use super::World;
 use super::definition::Material;
 use crate::error::{Error, finite_vec};
-use crate::math::{Pose, Real};
+use crate::math::{Pose, Real, Vec3};
 
 impl World {
     /// Pose of a shape's frame in the world.
@@ -31,11 +31,11 @@ impl World {
         self.bodies[shape.body as usize].pose.mul(&shape.pose)
     }
 
-    /// What the surface of a shape is made of at a part of it.
-    fn material_at(&self, slot: u32, _child: Option<u32>, triangle: Option<u32>) -> Material {
-        let shape = &self.shapes[slot as usize];
-        let number = triangle.map_or(0, |triangle| shape.geometry.triangle_material(triangle));
-        *shape.surface(number)
+    /// What the surface of a shape is made of at a part of it: child and triangle, a point there and its normal in the world.
+    fn material_at(&self, slot: u32, part: (Option<u32>, Option<u32>), (point, normal): (Vec3, Vec3)) -> Material {
+        let (shape, placed) = (&self.shapes[slot as usize], self.placed(slot));
+        let there = (placed.inverse_transform_point(point), placed.rotation.inverse_rotate(normal));
+        *shape.surface(shape.geometry.part_material(part, there))
     }
 }
 

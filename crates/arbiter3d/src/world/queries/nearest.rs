@@ -190,14 +190,16 @@ impl World {
 
     fn point_hit(&self, slot: u32, placed: &Pose, found: &Separation) -> PointHit {
         let shape = &self.shapes[slot as usize];
+        let (point, normal) =
+            (placed.transform_point(found.distance.point1), placed.rotation.rotate(found.distance.normal));
         PointHit {
             body: self.body_id(shape.body),
             shape: shape.id,
             child: found.child,
             triangle: found.triangle,
-            material: self.material_at(slot, found.child, found.triangle),
-            point: placed.transform_point(found.distance.point1),
-            normal: placed.rotation.rotate(found.distance.normal),
+            material: self.material_at(slot, (found.child, found.triangle), (point, normal)),
+            point,
+            normal,
             distance: found.distance.distance,
         }
     }

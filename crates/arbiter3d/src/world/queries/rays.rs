@@ -149,14 +149,15 @@ impl World {
 
     fn ray_hit(&self, ray: &Ray, found: &Found) -> RayHit {
         let Found { slot, id, part } = *found;
+        let (point, normal) = (ray.at(part.hit.fraction), self.placed(slot).rotation.rotate(part.hit.normal));
         RayHit {
             body: self.body_id(self.shapes[slot as usize].body),
             shape: id,
             child: part.child,
             triangle: part.triangle,
-            material: self.material_at(slot, part.child, part.triangle),
-            point: ray.at(part.hit.fraction),
-            normal: self.placed(slot).rotation.rotate(part.hit.normal),
+            material: self.material_at(slot, (part.child, part.triangle), (point, normal)),
+            point,
+            normal,
             fraction: part.hit.fraction,
         }
     }
