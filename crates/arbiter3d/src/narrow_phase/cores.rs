@@ -14,7 +14,7 @@
 
 use super::support::{Support, furthest};
 use crate::math::Vec3;
-use crate::shape::{ConvexHull, Custom, Shape, Transformed};
+use crate::shape::{ConvexHull, Custom, Transformed};
 use glam::{DMat3, DVec2, DVec3};
 
 /// Where the curvature is not known: by how much directions lean between which it is measured. Farthest points in single
@@ -51,12 +51,6 @@ pub(super) enum Core<'a> {
     Ellipsoid(Ellipsoid),
     Transformed(&'a Transformed),
     Custom(&'a Custom),
-    /// A smaller copy of a convex shape about a point inside.
-    Scaled {
-        shape: &'a Shape,
-        center: DVec3,
-        factor: f64,
-    },
 }
 
 /// The outward normals of a side that is straight along lines to an apex, or to none: unit vectors with the same `y`.
@@ -97,13 +91,12 @@ impl<'a> Core<'a> {
                 }
             }
             Support::Cloud(s) => Self::Points(s.points()),
-            Support::Rounded(s) => Support::new(s.core()).map_or(Self::Point, |core| Self::new(&core)),
+            Support::Rounded(rounded) | Support::Slim { rounded, .. } => {
+                Support::new(rounded.core()).map_or(Self::Point, |core| Self::new(&core))
+            }
             Support::Transformed(s) => s.ellipsoid().map_or(Self::Transformed(s), Self::Ellipsoid),
             Support::Custom(s) => Self::Custom(s),
             Support::Points(points) => Self::Points(points),
-            Support::Scaled { shape, center, factor } => {
-                Self::Scaled { shape, center: center.as_dvec3(), factor: factor.into() }
-            }
         }
     }
 
@@ -142,10 +135,6 @@ impl<'a> Core<'a> {
             Self::Ellipsoid(s) => s.support(direction),
             Self::Transformed(s) => s.support(direction),
             Self::Custom(s) => s.support(direction),
-            Self::Scaled { shape, center, factor } => {
-                let whole = Support::new(shape).map_or(*center, |whole| whole.core_support(direction));
-                *center + (whole - *center) * *factor
-            }
         }
     }
 
@@ -158,7 +147,6 @@ impl<'a> Core<'a> {
             Self::Ellipsoid(s) => s.center,
             Self::Custom(s) => s.shape().center().as_dvec3(),
             Self::Transformed(s) => crate::shape::Geometry::inner_ball(*s).0.as_dvec3(),
-            Self::Scaled { center, .. } => *center,
             Self::TwoBalls { .. } | Self::Point | Self::Segment(_) => DVec3::ZERO,
             Self::Cuboid(_) | Self::Cylinder { .. } | Self::Cone { .. } => DVec3::ZERO,
         }
@@ -278,7 +266,7 @@ impl<'a> Core<'a> {
                     [a.dot(a) - along1 * along1, a.dot(b) - along1 * along2, b.dot(b) - along2 * along2];
                 Some([k11 / height, k12 / height, k22 / height])
             }
-            Self::Transformed(_) | Self::Custom(_) | Self::Scaled { .. } => {
+            Self::Transformed(_) | Self::Custom(_) => {
                 // Half the differences of the farthest points of directions that lean to both sides.
                 let bend = |t: DVec3| {
                     let [ahead, behind] = [LEAN, -LEAN].map(|lean| self.support(normal + t * lean));

@@ -9,6 +9,8 @@
 //! to half their way, again and again, and to the surface in the end.
 
 use super::mesh::{MeshSides, TriangleMesh};
+use super::surface::Surface;
+use super::surface_ray::first_triangle;
 use crate::math::{Aabb, Pose, Real, Vec3, max, min, normalize_or};
 use crate::narrow_phase::{Support, closest};
 use std::cmp::Ordering;
@@ -43,7 +45,8 @@ impl InnerShell {
             let direction = normalize_or(inwards[at], Vec3::ZERO);
             let start = vertices[at] + direction * (1e-4 * size);
             if direction != Vec3::ZERO
-                && let Some((distance, _, true)) = mesh.first_hit(start, direction, 4.0 * size, MeshSides::Two)
+                && let Some((distance, _, true)) =
+                    first_triangle(Surface::Mesh(mesh), (start, direction, 4.0 * size), MeshSides::Two)
             {
                 ways[at] = direction * (DEPTH * distance);
             }
