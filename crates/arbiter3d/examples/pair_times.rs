@@ -1,11 +1,11 @@
-//! Times the narrow phase on single pairs of convex shapes that are known by their support: cans, cones, ellipsoids, rounded
-//! and custom shapes.
+//! Times the narrow phase on single pairs of convex shapes that are known by their support: cans, cones, ellipsoids,
+//! rounded and custom shapes.
 //!
-//! Each pair is posed 64 times with other turns and shifts, at four distances: at rest (an overlap of some thousandths of the
-//! size), apart by half of the margin, apart by more, and deep in each other. What is told is the time of one call of `collide`, the least of
-//! several rounds, in nanoseconds. Run with
-//! `cargo run --release -p arbiter3d --example pair_times`; words after `--` choose pairs whose name holds one of them, and a
-//! number alone says how many rounds (so that `valgrind --tool=callgrind` can count the instructions of few).
+//! Each pair is posed 64 times with other turns and shifts, at four distances: at rest (an overlap of some thousandths
+//! of the size), apart by half of the margin, apart by more, and deep in each other. What is told is the time of one
+//! call of `collide`, the least of several rounds, in nanoseconds. Run with `cargo run --release -p arbiter3d --example
+//! pair_times`; words after `--` choose pairs whose name holds one of them, and a number alone says how many rounds (so
+//! that `valgrind --tool=callgrind` can count the instructions of few).
 
 use arbiter3d::math::{Pose, Rotation, Vec3};
 use arbiter3d::narrow_phase::{Manifold, PairCache, collide};

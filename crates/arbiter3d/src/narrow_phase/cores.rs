@@ -1,13 +1,14 @@
-//! The core of a convex shape as the searches of one pair see it: its numbers once in `f64`, a closed form for the farthest
-//! point, and what else is known in closed form.
+//! The core of a convex shape as the searches of one pair see it: its numbers once in `f64`, a closed form for the
+//! farthest point, and what else is known in closed form.
 //!
-//! Resolved once a pair: which kind it is, what a rounded shape is made of, the matrix of an ellipsoid. What else is known:
+//! Resolved once a pair: which kind it is, what a rounded shape is made of, the matrix of an ellipsoid. What else is
+//! known:
 //!
 //! - the face that looks towards a point (`face_towards`), for cores that have faces;
 //! - the normals of a round side (`belt`), which are on a circle for cylinders, cones and hulls of two balls;
 //! - how deep a point lies inside (`inner_depth`): the radius of the largest ball around it that fits, or less;
-//! - the curvature where a direction is farthest (`curvature`): the second derivative of the support function, which for
-//!   an ellipsoid `{c + L u : |u| ≤ 1}` with `x = L Lᵀ n / |Lᵀ n|` is `(L Lᵀ − x xᵀ) / (n · x)`.
+//! - the curvature where a direction is farthest (`curvature`): the second derivative of the support function, which
+//!   for an ellipsoid `{c + L u : |u| ≤ 1}` with `x = L Lᵀ n / |Lᵀ n|` is `(L Lᵀ − x xᵀ) / (n · x)`.
 //!
 //! A ball whose radius is the least radius of curvature rolls inside of a smooth convex body along all of its boundary
 //! (Blaschke's rolling theorem); for an ellipsoid with half axes `a ≥ b ≥ c` that is `c² / a`.
@@ -17,8 +18,8 @@ use crate::math::Vec3;
 use crate::shape::{ConvexHull, Custom, Transformed};
 use glam::{DMat3, DVec2, DVec3};
 
-/// Where the curvature is not known: by how much directions lean between which it is measured. Farthest points in single
-/// precision tell it to a hundred thousandth of the size then.
+/// Where the curvature is not known: by how much directions lean between which it is measured. Farthest points in
+/// single precision tell it to a hundred thousandth of the size then.
 const LEAN: f64 = 1e-2;
 
 /// The core of a convex shape.
@@ -152,8 +153,8 @@ impl<'a> Core<'a> {
         }
     }
 
-    /// Outward unit normal of the face whose plane a point is highest over, with the plane's distance from the origin; `None`
-    /// if some round side is nearer, or no face is known.
+    /// Outward unit normal of the face whose plane a point is highest over, with the plane's distance from the origin;
+    /// `None` if some round side is nearer, or no face is known.
     pub(super) fn face_towards(&self, point: DVec3) -> Option<(DVec3, f64)> {
         match self {
             Self::Cuboid(h) => {
@@ -231,8 +232,8 @@ impl<'a> Core<'a> {
         }
     }
 
-    /// Second derivatives of the support function along two tangents of the unit vector `normal`: both along the first, mixed, both
-    /// along the second. `None` where they are endless. `touching` is the point farthest along `normal`.
+    /// Second derivatives of the support function along two tangents of the unit vector `normal`: both along the first,
+    /// mixed, both along the second. `None` where they are endless. `touching` is the point farthest along `normal`.
     pub(super) fn curvature(&self, touching: DVec3, normal: DVec3, [t1, t2]: [DVec3; 2]) -> Option<[f64; 3]> {
         let ring = |radius: f64| {
             let across = (normal.x * normal.x + normal.z * normal.z).sqrt();

@@ -25,12 +25,13 @@ pub(super) use newton::{Settled, tangents};
 
 /// Cores closer than this share of their size overlap: beyond it the direction is rounding.
 const TOUCHING: f64 = 1e-9;
-/// A tetrahedron is flat where a corner is over the opposite face at a smaller sine than this: corners of boxes and prisms often
-/// lie on one plane but for rounding.
+/// A tetrahedron is flat where a corner is over the opposite face at a smaller sine than this: corners of boxes and
+/// prisms often lie on one plane but for rounding.
 const FLAT: f64 = 1e-10;
 /// The search ends when a new extreme point gains less than this share of the distance.
 const GAIN: f64 = 1e-12;
-/// Round cores come closer by ever less (unless Newton's method works): the direction is good to three hundred thousandths then.
+/// Round cores come closer by ever less (unless Newton's method works): the direction is good to three hundred
+/// thousandths then.
 const ROUND_GAIN: f64 = 1e-9;
 /// With the shapes moved, as it is done once more from there.
 const LIFTED_GAIN: f64 = 1e-8;
@@ -102,8 +103,8 @@ pub(super) enum Nearness {
     Overlap,
 }
 
-/// The search for [`closest`], given up once a direction shows a gap beyond `limit`; `start` points from shape 1 to shape 2 and
-/// is not zero; `shift` is added to the position of shape 2. The simplex is left as it was last.
+/// The search for [`closest`], given up once a direction shows a gap beyond `limit`; `start` points from shape 1 to
+/// shape 2 and is not zero; `shift` is added to the position of shape 2. The simplex is left as it was last.
 fn search(placed: &Placed<'_>, limit: f64, (start, shift): (DVec3, DVec3), simplex: &mut Simplex) -> Nearness {
     let gain = if !placed.round {
         GAIN
@@ -153,7 +154,8 @@ fn search(placed: &Placed<'_>, limit: f64, (start, shift): (DVec3, DVec3), simpl
             return Nearness::Overlap;
         };
         if feature.squared >= shortest {
-            // Of corners that almost coincide the regions are rounding: the nearest of all faces, edges and corners is not.
+            // Of corners that almost coincide the regions are rounding: the nearest of all faces, edges and corners is
+            // not.
             feature = simplex.nearest_of_all();
         }
         if feature.squared >= shortest {
@@ -317,7 +319,8 @@ impl Simplex {
         at.map(|k| self.corners[k].difference)
     }
 
-    /// The face, edge or corner closest to the origin; `None` if it is inside. `settled` as for [`closest_on_tetrahedron`].
+    /// The face, edge or corner closest to the origin; `None` if it is inside. `settled` as for
+    /// [`closest_on_tetrahedron`].
     #[inline(always)]
     fn nearest_feature(&self, settled: bool) -> Option<Feature> {
         match self.count {
@@ -328,8 +331,8 @@ impl Simplex {
         }
     }
 
-    /// As [`Simplex::nearest_feature`] for an origin outside, by trying all of them: slower, but no rounding makes it farther
-    /// than any of them.
+    /// As [`Simplex::nearest_feature`] for an origin outside, by trying all of them: slower, but no rounding makes it
+    /// farther than any of them.
     #[cold]
     fn nearest_of_all(&self) -> Feature {
         let mut best = Feature::corner(0, self.corners[0].difference);
@@ -445,8 +448,8 @@ fn closest_on_triangle([p, q, r]: [DVec3; 3], [a, b, c]: [usize; 3]) -> Feature 
     best
 }
 
-/// `None` if the origin is inside. If the last corner was looked for from the face of the others, the origin is on the same
-/// side of that face: it is `settled`.
+/// `None` if the origin is inside. If the last corner was looked for from the face of the others, the origin is on the
+/// same side of that face: it is `settled`.
 #[inline(always)]
 fn closest_on_tetrahedron(p: &[DVec3; 4], settled: bool) -> Option<Feature> {
     let mut best: Option<Feature> = None;
@@ -455,7 +458,8 @@ fn closest_on_tetrahedron(p: &[DVec3; 4], settled: bool) -> Option<Feature> {
         let n = (p[b] - p[a]).cross(p[c] - p[a]);
         let (up, inside) = (p[opposite] - p[a], n.dot(p[opposite] - p[a]));
         let origin = -n.dot(p[a]);
-        // The origin is beyond this face, or the tetrahedron is flat (then the sign is rounding) and all its faces count.
+        // The origin is beyond this face, or the tetrahedron is flat (then the sign is rounding) and all its faces
+        // count.
         let is_flat = inside * inside <= FLAT * FLAT * n.length_squared() * up.length_squared();
         if is_flat || (inside > 0.0) != (origin > 0.0) {
             let feature = closest_on_triangle([p[a], p[b], p[c]], [a, b, c]);

@@ -1,18 +1,21 @@
-//! Where two convex cores are nearest, or where they overlap least: closed forms first, a search where they do not tell.
+//! Where two convex cores are nearest, or where they overlap least: closed forms first, a search where they do not
+//! tell.
 //!
-//! Every answer is a direction `n` with a point of each core, held between two bounds of the separation (a gap, or a depth
-//! with a minus): from below by the gap along `n`, which no two points can come closer than; from above by two points of the
-//! cores as far apart, or by a point that lies as deep in one core as the overlap along `n`: a ball around it shows that there
-//! is no shorter way out (see `penetration`). Where both bounds are the same the answer is exact, wherever the guess is from:
+//! Every answer is a direction `n` with a point of each core, held between two bounds of the separation (a gap, or a
+//! depth with a minus): from below by the gap along `n`, which no two points can come closer than; from above by two
+//! points of the cores as far apart, or by a point that lies as deep in one core as the overlap along `n`: a ball
+//! around it shows that there is no shorter way out (see `penetration`). Where both bounds are the same the answer is
+//! exact, wherever the guess is from:
 //!
-//! - **Faces.** The face of one core that looks at the other one, and the other one's lowest point over it. If that is over the
-//!   face (and, if it is below its plane, farther from the sides than deep), the face's normal it is: what stands or lies on a
-//!   box, or on the end of a can.
+//! - **Faces.** The face of one core that looks at the other one, and the other one's lowest point over it. If that is
+//!   over the face (and, if it is below its plane, farther from the sides than deep), the face's normal it is: what
+//!   stands or lies on a box, or on the end of a can.
 //! - **Lines.** Round sides that touch along lines which cross, or side by side: logs on logs.
-//! - **Sides** of cylinders, cones and hulls of two balls, and the other core's lowest point over one of their lines: as for a
-//!   face, once the line is found by Newton's method (`Seen::over_side`): a rim, a corner or an ellipsoid on a lying can.
-//! - **Ellipsoids**, against each other and what has a known curvature: Newton's method (`distance::newton`). Balls that roll
-//!   inside of the ellipsoids prove the height the least of all as long as it is less than their radii.
+//! - **Sides** of cylinders, cones and hulls of two balls, and the other core's lowest point over one of their lines:
+//!   as for a face, once the line is found by Newton's method (`Seen::over_side`): a rim, a corner or an ellipsoid on a
+//!   lying can.
+//! - **Ellipsoids**, against each other and what has a known curvature: Newton's method (`distance::newton`). Balls
+//!   that roll inside of the ellipsoids prove the height the least of all as long as it is less than their radii.
 //!
 //! And a direction along which the cores are apart by more than is asked for ends all of this at once. What is left is
 //! searched for with `distance` and `penetration`.
@@ -30,12 +33,12 @@ const BESIDE: f64 = 1e-8;
 const STRETCH: f64 = 1e-6;
 /// Axes whose angle has a sine with a smaller square are parallel.
 const PARALLEL: f64 = 1e-6;
-/// Newton's method ends where the extreme difference is off the direction by less than this share of the rolling radius: what
-/// is left of the height is the square of it.
+/// Newton's method ends where the extreme difference is off the direction by less than this share of the rolling
+/// radius: what is left of the height is the square of it.
 const ALIGNED: f64 = 1e-5;
-/// Newton's method about an axis ends with a turn of so many radians. It takes three or four rounds, or does not work.
+/// Newton's method about an axis may end with a turn of so many radians.
 const STILL: f64 = 1e-6;
-/// Halving brings it there where a rim is all but level.
+/// It takes three or four rounds, or does not work.
 const SIDE_ROUNDS: usize = 8;
 
 /// Where two cores are nearest, or overlap least, in the frame of shape 1.
@@ -124,8 +127,8 @@ impl<'a> Seen<'a> {
         if self.first { self.placed.place(point) } else { self.placed.turn_back(point - self.placed.position()) }
     }
 
-    /// Whether a plane of the own core with the other one's lowest point over it is the answer: where that is over the part of
-    /// the surface that is in the plane, and as deep inside as below the plane.
+    /// Whether a plane of the own core with the other one's lowest point over it is the answer: where that is over the
+    /// part of the surface that is in the plane, and as deep inside as below the plane.
     fn over_plane(&self, normal: DVec3, lowest: DVec3, distance: f64) -> Answer {
         let below = lowest - normal * distance;
         let is_least = if distance >= 0.0 {
@@ -165,9 +168,9 @@ impl<'a> Seen<'a> {
 
     /// The round side under the other core: Newton's method for the turn about the axis.
     ///
-    /// The unit normal `n` of the side turns by an angle about y. With `n'` and `r = −n''` its derivatives and `x` the other
-    /// core's lowest point, the height `offset − n · x` has the slope `−n' · x` and the second derivative `n' · K n' + r · x`,
-    /// with `K` the second derivative of the other core's support function.
+    /// The unit normal `n` of the side turns by an angle about y. With `n'` and `r = −n''` its derivatives and `x` the
+    /// other core's lowest point, the height `offset − n · x` has the slope `−n' · x` and the second derivative `n' · K
+    /// n' + r · x`, with `K` the second derivative of the other core's support function.
     fn over_side(&self, limit: f64) -> Answer {
         let Some(Belt { rise, offset }) = self.core.belt() else { return Answer::Open };
         let middle = self.inward(self.other.middle());
@@ -245,7 +248,8 @@ impl Turn {
 
 /// The round sides of both cores, where a line of one crosses a line of the other.
 ///
-/// The normal has the height of either circle of normals along either axis; what is left of its length is square to both.
+/// The normal has the height of either circle of normals along either axis; what is left of its length is square to
+/// both.
 fn across_sides(placed: &Placed<'_>, limit: f64) -> Answer {
     let [core1, core2] = placed.cores();
     let (Some(belt1), Some(belt2)) = (core1.belt(), core2.belt()) else { return Answer::Open };
@@ -313,8 +317,9 @@ fn axis(core: &Core<'_>) -> Option<(f64, f64)> {
     }
 }
 
-/// Whether a point on the side of core 1, and the one `distance` further along the normal on that of core 2, are those that
-/// prove the gap (of both cores, along the normal) the largest; where it is negative, by the point half way between them.
+/// Whether a point on the side of core 1, and the one `distance` further along the normal on that of core 2, are those
+/// that prove the gap (of both cores, along the normal) the largest; where it is negative, by the point half way
+/// between them.
 fn is_between(placed: &Placed<'_>, point1: DVec3, normal: DVec3, (gap, distance): (f64, f64)) -> bool {
     let [core1, core2] = placed.cores();
     let local = |point: DVec3| placed.turn_back(point - placed.position());
@@ -348,7 +353,8 @@ fn between_ellipsoids(placed: &Placed<'_>, limit: f64) -> Answer {
         Settled::Beyond => Answer::Beyond,
         Settled::Open => Answer::Open,
         Settled::At { corner, normal, height, aside } => {
-            // The ball that touches where the core is farthest reaches as far behind the origin, but for its share aside.
+            // The ball that touches where the core is farthest reaches as far behind the origin, but for its share
+            // aside.
             let beyond = rolling - height;
             let proved = height <= 0.0 || beyond > 0.0 && aside <= 2.0 * SAME * beyond * rolling;
             let found = Nearest { point1: corner.point1, normal, distance: -height };

@@ -88,7 +88,8 @@ fn closed_forms_give_the_distance_of_the_search() {
     assert!(apart > 5000, "{apart}");
 }
 
-/// Needles, plates, points and coplanar figures, ten thousand times as long as wide: always an end, always a finite answer.
+/// Needles, plates, points and coplanar figures, ten thousand times as long as wide: always an end, always a finite
+/// answer.
 #[test]
 fn what_is_flat_or_thin_still_gets_an_answer() {
     let mut random = Random(0x00DE_9E4E_4A7E_0BAD);

@@ -1,24 +1,27 @@
 //! How deep two convex cores overlap, and along which normal.
 //!
-//! The cores overlap where the origin is inside the set of differences `x1 − x2`. Its height along a unit vector `n`, the largest
-//! `n · (x1 − x2)`, is how far shape 2 has to move along `n` to part from shape 1; the least of all heights is the depth.
+//! The cores overlap where the origin is inside the set of differences `x1 − x2`. Its height along a unit vector `n`,
+//! the largest `n · (x1 − x2)`, is how far shape 2 has to move along `n` to part from shape 1; the least of all heights
+//! is the depth.
 //!
-//! Of polyhedra it is found by the expanding polytope: one inside the set grows, the face nearest to the origin being replaced
-//! by those to the set's farthest point along its normal, until that is no farther than the face. Source: van den Bergen,
-//! "Proximity Queries and Penetration Depth Computation on 3D Game Objects", 2001. Unlike there, the first tetrahedron need not
-//! hold the origin: a face that the origin is in front of has a negative distance and so comes first.
+//! Of polyhedra it is found by the expanding polytope: one inside the set grows, the face nearest to the origin being
+//! replaced by those to the set's farthest point along its normal, until that is no farther than the face. Source: van
+//! den Bergen, "Proximity Queries and Penetration Depth Computation on 3D Game Objects", 2001. Unlike there, the first
+//! tetrahedron need not hold the origin: a face that the origin is in front of has a negative distance and so comes
+//! first.
 //!
 //! Round sets would need many corners for that. They are searched the other way round:
 //!
-//! 1. The lowest of some heights: along the line of centres, the faces that look at each other, the last direction in which the
-//!    closest points were looked for.
-//! 2. Moved just apart along that direction, the closest points give a better one, which is never higher and soon the lowest
-//!    around: the normal of a round surface turns by less than the position that it is looked at from (`polished`).
-//! 3. That no other way out is shorter, far from it, is proved. A point that is `a` deep in core 1 and `b` deep in core 2 (balls
-//!    of these radii around it fit in) shows that the set of differences holds a ball of radius `a + b` about the origin, so
-//!    that nothing is lower. Where the deepest points show that, nothing is left to do (`is_proved`).
-//! 4. Else the polytope grows until all of its faces are as far as the height found, but for a tolerance. A face that is not and
-//!    whose own height is lower begins anew at 2.
+//! 1. The lowest of some heights: along the line of centres, the faces that look at each other, the last direction in
+//!    which the closest points were looked for.
+//! 2. Moved just apart along that direction, the closest points give a better one, which is never higher and soon the
+//!    lowest around: the normal of a round surface turns by less than the position that it is looked at from
+//!    (`polished`).
+//! 3. That no other way out is shorter, far from it, is proved. A point that is `a` deep in core 1 and `b` deep in core
+//!    2 (balls of these radii around it fit in) shows that the set of differences holds a ball of radius `a + b` about
+//!    the origin, so that nothing is lower. Where the deepest points show that, nothing is left to do (`is_proved`).
+//! 4. Else the polytope grows until all of its faces are as far as the height found, but for a tolerance. A face that
+//!    is not and whose own height is lower begins anew at 2.
 //!
 //! All in `f64`, as in `distance`.
 
@@ -36,8 +39,8 @@ const ROUND_SHARE: f64 = 5e-6;
 const ROUNDING: f64 = 1e-9;
 /// What is thinner than this share of its size is flat.
 const FLAT: f64 = 1e-9;
-/// Around the way out the set is known from directions that lean by this tangent: as far as its smooth part stays within the
-/// tolerance of the triangle between them.
+/// Around the way out the set is known from directions that lean by this tangent: as far as its smooth part stays
+/// within the tolerance of the triangle between them.
 const RING_LEAN: f64 = 4e-3;
 const RING: [(f64, f64); 3] = [(1.0, 0.0), (-0.5, 0.866_025_403_784), (-0.5, -0.866_025_403_784)];
 /// A tetrahedron to begin with has at least six times this share of the cube of its shortest edge as its volume.
@@ -129,8 +132,9 @@ fn round_penetration(placed: &Placed<'_>, simplex: &Simplex) -> Penetration {
 }
 
 impl Way {
-    /// What was found. Where the closest points did not help (the support of a large shape in single precision is too coarse for
-    /// a small one beside it), farthest points of both cores can lie far aside from each other: the smaller shape's counts.
+    /// What was found. Where the closest points did not help (the support of a large shape in single precision is too
+    /// coarse for a small one beside it), farthest points of both cores can lie far aside from each other: the smaller
+    /// shape's counts.
     fn opposite(self, placed: &Placed<'_>, size: f64) -> Penetration {
         let Penetration { point1, normal, depth } = self.found;
         let other = self.point2 + normal * depth;
@@ -152,8 +156,8 @@ fn toward(placed: &Placed<'_>) -> DVec3 {
     (placed.place(core2.middle()) - core1.middle()).normalize_or(DVec3::Y)
 }
 
-/// The expanding polytope; `None` if there is no room for all that it needs. Of polyhedra it finds the least way out, of round
-/// cores it proves that none is shorter than the goal, or finds one.
+/// The expanding polytope; `None` if there is no room for all that it needs. Of polyhedra it finds the least way out,
+/// of round cores it proves that none is shorter than the goal, or finds one.
 fn grow<const C: usize, const F: usize>(placed: &Placed<'_>, simplex: &Simplex, goal: Option<&Goal>) -> Option<Way> {
     let corner = |direction: DVec3| {
         let corner = placed.corner(-direction);
@@ -247,9 +251,9 @@ fn shallowest(placed: &Placed<'_>, simplex: &Simplex) -> Way {
     best
 }
 
-/// The same way out, seen from a little farther: with the shapes moved just apart along the normal found, the closest points
-/// tell the true one the better the shallower the overlap is, because the normal of a round surface turns by less than the
-/// position that it is looked at from.
+/// The same way out, seen from a little farther: with the shapes moved just apart along the normal found, the closest
+/// points tell the true one the better the shallower the overlap is, because the normal of a round surface turns by
+/// less than the position that it is looked at from.
 fn polished(placed: &Placed<'_>, from: Way, size: f64) -> Way {
     let (mut best, lift) = (from, LIFT * size);
     let aligned = POLISH_GAIN * size;
@@ -280,8 +284,8 @@ fn polished(placed: &Placed<'_>, from: Way, size: f64) -> Way {
     best
 }
 
-/// Whether the points that touch show that no way out is shorter: a point `a` deep in core 1 and `b` deep in core 2 is the
-/// middle of a ball of radius `a + b` in the set of differences.
+/// Whether the points that touch show that no way out is shorter: a point `a` deep in core 1 and `b` deep in core 2 is
+/// the middle of a ball of radius `a + b` in the set of differences.
 fn is_proved(placed: &Placed<'_>, way: &Way, tolerance: f64) -> bool {
     let [core1, core2] = placed.cores();
     let Penetration { point1, normal, depth } = way.found;
@@ -417,8 +421,8 @@ impl<const C: usize, const F: usize> Polytope<C, F> {
 
     /// Takes in a corner that a face sees; false if there is no room for it.
     ///
-    /// What goes is the connected patch of faces that see the corner: among flat faces rounding would have others see it
-    /// too, here and there.
+    /// What goes is the connected patch of faces that see the corner: among flat faces rounding would have others see
+    /// it too, here and there.
     fn expand(&mut self, seen: usize, corner: Corner) -> bool {
         let mut outline = Outline { edges: [[0; 2]; MAX_HORIZON], count: 0 };
         if self.corner_count == C || !outline.cross(self.faces[seen].corners) {

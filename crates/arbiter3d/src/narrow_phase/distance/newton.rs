@@ -1,10 +1,11 @@
 //! Newton's method for the direction in which two cores are farthest apart, or overlap least.
 //!
-//! The height of the differences `x1 − x2` along a unit vector `n` is `h = n · w`, with `w` the farthest one. With `K` the sum of
-//! the second derivatives of both cores' support functions (`cores`) it changes by `w · t + t · (K − h) t / 2` when `n` turns by
-//! a small `t` square to it. Its lowest value is the depth, or for cores that are apart the distance with a minus; there `w`
-//! lies along `n`. Near it three rounds do, where the search on simplices needs the more the rounder the cores are beside
-//! the gap. It fails (which is told, and costs little) where lines or faces touch.
+//! The height of the differences `x1 − x2` along a unit vector `n` is `h = n · w`, with `w` the farthest one. With `K`
+//! the sum of the second derivatives of both cores' support functions (`cores`) it changes by `w · t + t · (K − h) t /
+//! 2` when `n` turns by a small `t` square to it. Its lowest value is the depth, or for cores that are apart the
+//! distance with a minus; there `w` lies along `n`. Near it three rounds do, where the search on simplices needs the
+//! more the rounder the cores are beside the gap. It fails (which is told, and costs little) where lines or faces
+//! touch.
 
 use super::{Corner, Placed};
 use glam::DVec3;
@@ -31,8 +32,8 @@ pub(in super::super) enum Settled {
 }
 
 impl Placed<'_> {
-    /// Begins with the direction `normal`, shape 2 being moved by `shift`, and ends where `is_settled` for the square of how far
-    /// the corner is off the normal and for the height.
+    /// Begins with the direction `normal`, shape 2 being moved by `shift`, and ends where `is_settled` for the square
+    /// of how far the corner is off the normal and for the height.
     pub(in super::super) fn settle(
         &self,
         mut normal: DVec3,
