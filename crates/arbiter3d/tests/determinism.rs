@@ -27,7 +27,7 @@ const GOLDEN: [(&str, u64); 10] = [
     ("custom contacts", 0x770f_f93e_d37a_7820),
     ("coming and going", 0xad49_17e9_d9a3_c27f),
     ("surfaces", 0xaae4_be7b_5bb6_52fe),
-    ("rods and bullets", 0x337e_1f6d_0c1b_0294),
+    ("rods and bullets", 0x7719_73f3_e529_702a),
     ("compounds and voxels", 0x38cb_4758_4a96_6801),
     ("mixed convex", 0x1bc1_9e5e_e510_3213),
 ];
@@ -48,7 +48,7 @@ const SCENES: [Scene; 10] = [
     Scene { name: "custom contacts", steps: 180, build: custom_contacts, before_step: |_, _| {} },
     Scene { name: "coming and going", steps: 300, build: coming_and_going, before_step: come_and_go },
     Scene { name: "surfaces", steps: 180, build: surfaces, before_step: ask_for_surfaces },
-    Scene { name: "rods and bullets", steps: 120, build: rods_and_bullets, before_step: |_, _| {} },
+    Scene { name: "rods and bullets", steps: 240, build: rods_and_bullets, before_step: |_, _| {} },
     Scene { name: "compounds and voxels", steps: 150, build: compounds_and_voxels, before_step: |_, _| {} },
     Scene { name: "mixed convex", steps: 180, build: mixed_convex, before_step: |_, _| {} },
 ];
