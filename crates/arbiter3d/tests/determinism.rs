@@ -48,7 +48,7 @@ const SCENES: [Scene; 10] = [
     Scene { name: "custom contacts", steps: 180, build: custom_contacts, before_step: |_, _| {} },
     Scene { name: "coming and going", steps: 300, build: coming_and_going, before_step: come_and_go },
     Scene { name: "surfaces", steps: 180, build: surfaces, before_step: ask_for_surfaces },
-    Scene { name: "rods and bullets", steps: 120, build: rods_and_bullets, before_step: |_, _| {} },
+    Scene { name: "rods and bullets", steps: 240, build: rods_and_bullets, before_step: |_, _| {} },
     Scene { name: "compounds and voxels", steps: 150, build: compounds_and_voxels, before_step: |_, _| {} },
     Scene { name: "mixed convex", steps: 180, build: mixed_convex, before_step: |_, _| {} },
 ];
