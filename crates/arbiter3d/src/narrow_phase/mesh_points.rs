@@ -47,6 +47,8 @@ const SAME_NORMAL: Real = 0.99985;
 const MERGE: [Real; 6] = [0.99, 0.9, 0.5, 0.0, -0.5, -2.0];
 /// Points less deep than the deepest by this share of the tolerance count as deepest: rounding, not rocking.
 const EQUALLY_DEEP: Real = 0.02;
+/// What is deeper than this, in tolerances, has run into something.
+const DEEP: Real = 50.0;
 /// How much a fixed direction counts beside the distance from the middle, where corners are equally deep.
 const PREFERRED: Real = 0.1;
 /// Another choice must be better by this share, so that rounding does not swap equal ones from step to step.
@@ -253,8 +255,10 @@ impl Candidates {
         let mut best = (0, -Real::MAX);
         for (i, candidate) in self.members(groups, group) {
             let away = candidate.position - middle;
-            // Of corners that are about as far out, the first one along a fixed direction.
-            let reach = away.length() + PREFERRED * away.dot(outwards);
+            // Of corners that are about as far out, the first one along a fixed direction; deep inside, where nothing slides on,
+            // that direction alone decides.
+            let along = away.dot(outwards);
+            let reach = if least < -DEEP * self.tolerance { along } else { away.length() + PREFERRED * along };
             if candidate.separation <= least + EQUALLY_DEEP * self.tolerance && reach > best.1 {
                 best = (i, reach);
             }

@@ -205,9 +205,12 @@ pub(super) fn update_contacts(data: &mut ContactData, places: &Places, rotations
     let mut matches = match_slots(data, points, break_distance);
     let mut used: u8 = matches.iter().filter(|&&slot| slot < SLOTS).fold(0, |mask, &slot| mask | 1 << slot);
     let left = ((data.usage_mask & 15) | data.usage_mask >> 4) & !used;
+    let sunk = has_sunk(points, break_distance);
     let mut loads = [0.0; SLOTS];
     for (i, place) in points.iter().enumerate().filter(|(i, _)| matches[*i] == SLOTS) {
-        loads[i] = passed_on(data, left, place, (points, &matches));
+        if !sunk {
+            loads[i] = passed_on(data, left, place, (points, &matches));
+        }
     }
     let (mut one_normal, mut others) = (true, 0);
     for (i, place) in points.iter().enumerate() {
@@ -246,6 +249,11 @@ fn passed_on(data: &ContactData, left: u8, point: &Place, (points, matches): (&[
     load / (0..points.len()).filter(heirs).count() as Real
 }
 
+/// Whether shapes have run into each other: such a body is pushed out, not borne, and no point is another's heir.
+fn has_sunk(points: &[Place], break_distance: Real) -> bool {
+    points.iter().any(|point| point.separation < -break_distance)
+}
+
 /// The slot of the contact that each point goes on from, or [`SLOTS`].
 fn match_slots(data: &ContactData, points: &[Place], break_distance: Real) -> [usize; SLOTS] {
     let old = &data.slots;
@@ -264,9 +272,13 @@ fn match_slots(data: &ContactData, points: &[Place], break_distance: Real) -> [u
     if !missing || unclaimed == 0 {
         return matches;
     }
+    let sunk = has_sunk(points, break_distance);
     for (found, point) in matches.iter_mut().zip(points).filter(|(found, _)| **found == SLOTS) {
         let near = |slot: usize| {
             let apart1 = (old[slot].local_anchor1 - point.anchor1).length_squared();
+            if sunk {
+                return apart1;
+            }
             min(apart1, (old[slot].local_anchor2 - point.anchor2).length_squared())
         };
         let mut best = break_distance * break_distance;
