@@ -7,6 +7,10 @@
 //! normal is the difference of two linear heights, and its corners make the manifold. The closest point itself is added
 //! where the corners miss it. So a can stands on four points of its rim, rolls on a line, and balances on a point.
 //!
+//! A solid that touches with an edge may have another face that looks more along the normal, and two solids that meet edge to
+//! edge show faces that do not overlap at all. So where the features leave no more than one point, those edges of both that
+//! lie most level to the normal are tried as well, against the features and against each other.
+//!
 //! Nothing in this prefers one of the two shapes: with roles exchanged, the same points come out, mirrored.
 //!
 //! Features are placed in `f64` and looked at from the touching point, so that a pebble on a hall keeps its height.
@@ -26,6 +30,17 @@ const PARALLEL_SINE: Real = 0.05;
 const ASIDE: Real = 0.04;
 /// The corners miss the closest point if they are all farther by this share of the smaller size.
 pub(super) const MISSED: Real = 1e-4;
+/// A corner as near as the closest point but for this share of the smaller size counts whatever the margin: rounding.
+const LEVEL: Real = 1e-5;
+/// Corners count as equally deep within this share of what [`choose_four`] takes for it: what leans by a thousandth stands on
+/// its lowest corner.
+pub(super) const EQUALLY_DEEP: Real = 0.05;
+/// A face's normal is taken for that of the contact if it is off by no more (half a degree), and if along it the shapes are no
+/// deeper than they are by this share of the smaller size.
+const FLAT_COSINE: f64 = 0.99996;
+const AS_GOOD: Real = 2e-5;
+/// How far overlapping shapes are moved beyond touching to see where they touch, as a share of the smaller size.
+const LIFT: f64 = 1e-3;
 /// Corners of two features clipped by each other at most.
 const CLIPPED: usize = 2 * FEATURE_POINTS;
 /// The feature number of a closest point that no corner stands for.
@@ -36,12 +51,40 @@ pub(crate) fn collide((shape1, shape2): (&Shape, &Shape), pose: &Pose, margin: R
     manifold.clear();
     let (Some(support1), Some(support2)) = (Support::new(shape1), Support::new(shape2)) else { return };
     let placed = Placed::new(&support1, &support2, pose);
-    let Some(touch) = Touch::find(&placed, margin) else { return };
+    let Some(mut touch) = Touch::find(&placed, margin) else { return };
     let (size1, size2) = (support1.size(), support2.size());
     let (mut feature1, mut feature2) = (Feature::default(), Feature::default());
+    let normal2 = -pose.rotation.inverse_rotate(touch.normal);
     support1.feature(touch.normal, &mut feature1);
-    support2.feature(-pose.rotation.inverse_rotate(touch.normal), &mut feature2);
-    touch.patch(&placed, (&feature1, &feature2), (margin, min(size1, size2)), manifold);
+    support2.feature(normal2, &mut feature2);
+    let size = min(size1, size2);
+    touch.lean_on_face(&placed, (&feature1, &feature2), size);
+    if touch.separation > margin {
+        return;
+    }
+    let mut patch = touch.patch(&placed, (&feature1, &feature2), (margin, size));
+    if patch.count < 2 {
+        let (mut edge1, mut edge2) = (Feature::default(), Feature::default());
+        support1.edge(touch.normal, &mut edge1);
+        support2.edge(normal2, &mut edge2);
+        for pair in [(&edge1, &feature2), (&feature1, &edge2), (&edge1, &edge2)] {
+            if pair.0.points().len() > 1 && pair.1.points().len() > 1 {
+                let other = touch.patch(&placed, pair, (margin, size));
+                if other.count > patch.count && other.lowest <= touch.separation + MISSED * size {
+                    patch = other;
+                }
+            }
+        }
+    }
+    touch.hand_on(&placed, &patch, size, manifold);
+}
+
+/// Where the figures of two features overlap within the margin.
+pub(super) struct Patch {
+    corners: [ClipPoint; CLIPPED],
+    count: usize,
+    /// The least separation of the corners.
+    lowest: Real,
 }
 
 /// The nearest points of two shapes, or the deepest ones.
@@ -67,14 +110,36 @@ impl Touch {
         (separation <= margin).then_some(Self { point1, normal: normal.as_vec3(), separation })
     }
 
-    /// The manifold of two features, each in the frame of its shape.
+    /// Takes the normal of a face for that of the contact, where it tells about the same: search and rounding leave the normal
+    /// of shapes that lie flat on each other a little off, and of an edge along a face there are many almost as good.
+    fn lean_on_face(&mut self, placed: &Placed<'_>, (feature1, feature2): (&Feature, &Feature), size: Real) {
+        let [radius1, radius2] = placed.radii();
+        let here = self.normal.as_dvec3();
+        let least = f64::from(self.separation) - f64::from(AS_GOOD * size);
+        let plane2 = plane_of(feature2).map(|normal| placed.place(DVec3::ZERO) - placed.place(normal));
+        let mut best = least;
+        for normal in [plane_of(feature1), plane2].into_iter().flatten() {
+            let normal = normal / normal.length();
+            if normal.dot(here) < FLAT_COSINE {
+                continue;
+            }
+            let corner = placed.corner(-normal);
+            let gap = corner.difference.dot(normal) - radius1 - radius2;
+            if gap > best {
+                best = gap;
+                self.point1 += normal * (normal.dot(corner.point1 - self.point1) + radius1);
+                (self.normal, self.separation) = (normal.as_vec3(), gap as Real);
+            }
+        }
+    }
+
+    /// What two features, each in the frame of its shape, share.
     pub(super) fn patch(
         &self,
         placed: &Placed<'_>,
         (feature1, feature2): (&Feature, &Feature),
         (margin, size): (Real, Real),
-        manifold: &mut Manifold,
-    ) {
+    ) -> Patch {
         let (t1, t2) = tangents(self.normal);
         let to_plane = DMat3::from_cols(t1.as_dvec3(), t2.as_dvec3(), self.normal.as_dvec3()).transpose();
         let view = View { point: self.point1, to_plane };
@@ -82,35 +147,38 @@ impl Touch {
         let figure2 = Figure::new(feature2, |point| view.see(placed.place(point)));
         let mut corners = [ClipPoint::default(); CLIPPED];
         let count = figure1.overlap(&figure2, ASIDE * size, &mut corners);
-        let mut kept = 0;
+        let (mut kept, mut lowest) = (0, Real::MAX);
+        let limit = max(self.separation + LEVEL * size, margin);
         for k in 0..count {
             let p = corners[k].position;
             let low = figure1.height(p.x, p.y);
             let separation = figure2.height(p.x, p.y) - low;
-            if separation <= margin && separation.is_finite() {
+            if separation <= limit && separation.is_finite() {
                 // Nothing is deeper along the normal than the closest point, but planes through corners that are not quite
                 // level may say so.
                 let separation = max(separation, self.separation);
+                lowest = min(separation, lowest);
                 let position = Vec3::new(p.x, p.y, low);
                 corners[kept] = ClipPoint { position, separation, feature: corners[k].feature };
                 kept += 1;
             }
         }
-        self.hand_on(&corners[..kept], (t1, t2), size, manifold);
+        Patch { corners, count: kept, lowest }
     }
 
     /// The four corners that matter, with the closest point where all of them are farther.
-    fn hand_on(&self, corners: &[ClipPoint], (t1, t2): (Vec3, Vec3), size: Real, manifold: &mut Manifold) {
-        let lowest = corners.iter().fold(Real::MAX, |m, c| min(c.separation, m));
+    pub(super) fn hand_on(&self, placed: &Placed<'_>, patch: &Patch, size: Real, manifold: &mut Manifold) {
+        let corners = &patch.corners[..patch.count];
+        let (t1, t2) = tangents(self.normal);
         let (chosen, mut count) = if corners.len() <= 4 {
             ([0, 1, 2, 3], corners.len())
         } else {
             let flat = |i: usize| (corners[i].position.x, corners[i].position.y);
-            choose_four(corners.len(), flat, |i| corners[i].separation, size)
+            choose_four(corners.len(), flat, |i| corners[i].separation, EQUALLY_DEEP * size)
         };
-        if lowest > self.separation + MISSED * size {
+        if patch.lowest > self.separation + MISSED * size {
             count = count.min(3);
-            let (point1, normal, separation) = (self.point1.as_vec3(), self.normal, self.separation);
+            let (point1, normal, separation) = (self.witness(placed).as_vec3(), self.normal, self.separation);
             manifold.push(ManifoldPoint { point1, normal, separation, feature: WITNESS });
         }
         for &k in &chosen[..count] {
@@ -120,6 +188,29 @@ impl Touch {
             manifold.push(ManifoldPoint { point1, normal: self.normal, separation, feature });
         }
     }
+
+    /// The closest point. Of cores that overlap, or touch but for rounding, it is that of the cores moved just apart: the way
+    /// out of an overlap tells the plane that they touch in, but where in it only if no other part of the boundary is as near.
+    fn witness(&self, placed: &Placed<'_>) -> DVec3 {
+        let [radius1, radius2] = placed.radii();
+        let (normal, lift) = (self.normal.as_dvec3(), LIFT * placed.size());
+        let distance = f64::from(self.separation) + radius1 + radius2;
+        if distance > lift {
+            return self.point1;
+        }
+        match placed.moved(normal * (lift - distance)).nearness(f64::INFINITY) {
+            Nearness::Gap(Gap { point1, .. }) => point1 + normal * radius1,
+            _ => self.point1,
+        }
+    }
+}
+
+/// Normal of a face, of any length, outwards; nothing of a line or a point.
+fn plane_of(feature: &Feature) -> Option<DVec3> {
+    let (first, rest) = feature.points().split_first()?;
+    let way = |point: &Vec3| point.as_dvec3() - first.as_dvec3();
+    let normal = rest.windows(2).fold(DVec3::ZERO, |sum, pair| sum + way(&pair[0]).cross(way(&pair[1])));
+    (normal.length_squared() > 0.0).then_some(normal)
 }
 
 /// Where a contact is looked at from: along its normal, about a point.

@@ -1,7 +1,7 @@
 //! Half-spaces (all below the plane through the origin, normal y) against convex shapes: exact, as every height is.
 
 use super::clip::choose_four;
-use super::general::MISSED;
+use super::general::{EQUALLY_DEEP, MISSED};
 use super::mesh_points::{Candidate, Candidates, NO_FACET, position_number};
 use super::support::Support;
 use super::{Manifold, ManifoldPoint};
@@ -36,7 +36,7 @@ pub(crate) fn collide(shape: &Shape, pose: &Pose, margin: Real, manifold: &mut M
     let (chosen, mut chosen_count) = if count <= 4 {
         ([0, 1, 2, 3], count)
     } else {
-        choose_four(count, |i| (points[i].0.x, points[i].0.z), |i| points[i].0.y, size)
+        choose_four(count, |i| (points[i].0.x, points[i].0.z), |i| points[i].0.y, EQUALLY_DEEP * size)
     };
     // A thinned or sampled feature can lack the lowest point.
     if least > lowest + MISSED * size {

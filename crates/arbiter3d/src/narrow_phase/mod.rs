@@ -51,6 +51,7 @@ pub use manifold::{Manifold, ManifoldPoint};
 use crate::math::{Pose, Real};
 use crate::shape::{Shape, Surface};
 use crate::simd::SimdLevel;
+use glam::DQuat;
 
 /// What a pair remembers between steps to find its contact faster: the last separating or reference feature.
 ///
@@ -103,11 +104,27 @@ pub(crate) fn collide_on(
 ) {
     if rank(shape1) >= rank(shape2) {
         collide_sorted(level, (shape1, shape2), pose, margin, (cache, manifold));
-    } else {
+    } else if rank(shape2) != GENERAL {
         collide_sorted(level, (shape2, shape1), &pose.inverse(), margin, (cache, manifold));
         mirror(pose, manifold);
+    } else if matches!(shape1, Shape::Sphere(_)) {
+        collide_sorted(level, (shape2, shape1), &exact_inverse(pose), margin, (cache, manifold));
+        mirror(pose, manifold);
+    } else {
+        // Either order is the same to it, and this one needs no inverse, which would cost a pebble on a hall its last digits.
+        general::collide((shape1, shape2), pose, margin, manifold);
     }
 }
+
+/// The inverse with the position reckoned in `f64`: as far away as it was but for one rounding.
+fn exact_inverse(pose: &Pose) -> Pose {
+    let q = pose.rotation;
+    let q = DQuat::from_xyzw(q.x.into(), q.y.into(), q.z.into(), q.w.into()).normalize();
+    Pose::new(-(q.conjugate() * pose.position.as_dvec3()).as_vec3(), pose.rotation.conjugate())
+}
+
+/// Rank of shapes without a kernel of their own.
+const GENERAL: u8 = 4;
 
 /// The shape with the higher rank plays shape 1.
 #[inline(always)]
@@ -121,7 +138,7 @@ fn rank(shape: &Shape) -> u8 {
         Shape::Mesh(_) | Shape::HeightField(_) => 5,
         Shape::Voxels(_) => 7,
         Shape::Compound(_) => 8,
-        _ => 4,
+        _ => GENERAL,
     }
 }
 

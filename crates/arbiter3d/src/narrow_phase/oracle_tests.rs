@@ -7,9 +7,10 @@
 
 use super::tests::Random;
 use super::*;
-use crate::math::{Mat3, Vec3, tangents};
+use crate::math::{Mat3, Vec3, max, min, tangents};
 use crate::shape::{ConvexHull, ConvexShape};
 use glam::{DMat3, DVec3};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// The upper half of a ball.
 #[derive(Debug)]
@@ -123,34 +124,53 @@ impl<'a> Pair<'a> {
         best
     }
 
-    /// The best gap found.
+    /// The best gap found. Of polyhedra that overlap one of the axes is the best direction of all: no search is needed.
     fn oracle(&self, grid: &[DVec3], axes: &[DVec3]) -> f64 {
+        let best = axes.iter().map(|&n| self.gap(n)).fold(f64::MIN, f64::max);
+        if !axes.is_empty() && best < 0.0 {
+            return best;
+        }
         let mut tried: Vec<(f64, DVec3)> = grid.iter().map(|&n| (self.gap(n), n)).collect();
         tried.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let climbed = tried[..3].iter().map(|&(_, n)| self.climb(n)).fold(f64::MIN, f64::max);
-        axes.iter().map(|&n| self.gap(n)).fold(climbed, f64::max)
+        tried[..3].iter().map(|&(_, n)| self.climb(n)).fold(best, f64::max)
     }
 
     /// Face normals of both and products of edges, where both are polyhedra.
-    fn axes(&self, shape1: &Shape, shape2: &Shape) -> Vec<DVec3> {
-        let (Some((mut normals, edges1)), Some((others, edges2))) = (polyhedron(shape1), polyhedron(shape2)) else {
+    fn axes(&self, first: &Specimen, second: &Specimen) -> Vec<DVec3> {
+        let (Some((normals, edges1)), Some((others, edges2))) = (&first.polyhedron, &second.polyhedron) else {
             return Vec::new();
         };
-        normals.extend(others.iter().map(|n| -(self.rotation * *n)));
-        for e1 in &edges1 {
-            for e2 in &edges2 {
+        let mut axes = normals.clone();
+        axes.extend(others.iter().map(|n| -(self.rotation * *n)));
+        for e1 in edges1 {
+            for e2 in edges2 {
                 let n = e1.cross(self.rotation * *e2);
                 if n.length() > 1e-5 * e1.length() * e2.length() {
-                    normals.extend([n, -n]);
+                    axes.extend([n, -n]);
                 }
             }
         }
-        normals
+        axes
+    }
+}
+
+/// A shape, and its faces and edges if it has some.
+struct Specimen {
+    shape: Shape,
+    polyhedron: Option<Solid>,
+}
+
+impl Specimen {
+    fn new(kind: usize, size: Real, thin: Real, random: &mut Random) -> Self {
+        let shape = specimen(kind, size, thin, random);
+        Self { polyhedron: polyhedron(&shape), shape }
     }
 }
 
 /// Face normals and edges.
-fn polyhedron(shape: &Shape) -> Option<(Vec<DVec3>, Vec<DVec3>)> {
+type Solid = (Vec<DVec3>, Vec<DVec3>);
+
+fn polyhedron(shape: &Shape) -> Option<Solid> {
     let hull = match shape {
         Shape::Cuboid(s) => ConvexHull::from_cuboid(s.half_extents()).ok()?,
         Shape::Hull(s) => (**s).clone(),
@@ -207,25 +227,47 @@ struct Case {
 
 const GRID_STEPS: usize = 5;
 
-/// Holds pairs of two kinds, `count` of them, against the definition.
-fn check(kinds: (usize, usize), (pool1, pool2): (&[Shape], &[Shape]), case: &Case, count: usize, random: &mut Random) {
+/// Holds pairs of two kinds, `count` of them, against the definition; what is wrong with them.
+fn check(kinds: (usize, usize), (pool1, pool2): (&[Specimen], &[Specimen]), case: &Case, count: usize) -> Vec<String> {
+    let mut random = Random(0x00C0_FFEE + (kinds.0 * 100 + kinds.1) as u64);
     let grid = crate::shape::sphere_grid(GRID_STEPS).0;
+    let mut wrong = Vec::new();
     for round in 0..count {
-        let (shape1, shape2) = (&pool1[round % pool1.len()], &pool2[round / 3 % pool2.len()]);
-        let small = Support::new(shape1).unwrap().size().min(Support::new(shape2).unwrap().size());
+        let (first, second) = (&pool1[round % pool1.len()], &pool2[round / 3 % pool2.len()]);
+        let small = small_size(&first.shape, &second.shape);
         let gap = match round % 4 {
             0 => random.between(-1e-6, 1e-6) * small,
             1 => random.between(-0.05, 0.05) * small,
             _ => random.between(-case.deep, 0.1 * case.deep) * small,
         };
-        let pose = pose_with_gap(shape1, shape2, gap, small, random);
+        let pose = pose_with_gap(&first.shape, &second.shape, gap, small, &mut random);
         let margin = if round % 2 == 0 { 0.0 } else { 0.02 * small };
-        check_pair(kinds, (shape1, shape2), &pose, margin, &grid);
+        if let Err(what) = check_pair(kinds, (first, second), &pose, margin, &grid) {
+            wrong.push(what);
+        }
     }
+    wrong
 }
 
-fn check_pair(kinds: (usize, usize), (shape1, shape2): (&Shape, &Shape), pose: &Pose, margin: Real, grid: &[DVec3]) {
-    let small = Support::new(shape1).unwrap().size().min(Support::new(shape2).unwrap().size());
+/// The smaller of the sizes that tolerances are relative to.
+fn small_size(shape1: &Shape, shape2: &Shape) -> Real {
+    Support::new(shape1).unwrap().size().min(Support::new(shape2).unwrap().size())
+}
+
+/// Tells what is wrong unless a law holds.
+fn law(holds: bool, told: impl FnOnce() -> String) -> Result<(), String> {
+    if holds { Ok(()) } else { Err(told()) }
+}
+
+fn check_pair(
+    kinds: (usize, usize),
+    (first, second): (&Specimen, &Specimen),
+    pose: &Pose,
+    margin: Real,
+    grid: &[DVec3],
+) -> Result<(), String> {
+    let (shape1, shape2) = (&first.shape, &second.shape);
+    let small = small_size(shape1, shape2);
     let large = shape1.reach().max(shape2.reach());
     let pair = Pair::new(shape1, shape2, pose);
     let found = contacts(shape1, shape2, pose, margin);
@@ -233,7 +275,7 @@ fn check_pair(kinds: (usize, usize), (shape1, shape2): (&Shape, &Shape), pose: &
     let old = kinds.0 < OLD && kinds.1 < OLD;
     // A normal in single precision is off by that much of the lever; a user's support function too.
     let rounding = if old || kinds.0.max(kinds.1) == KINDS.len() - 1 { 1e-6 * large } else { 4e-7 * large };
-    let best = pair.oracle(grid, &pair.axes(shape1, shape2));
+    let best = pair.oracle(grid, &pair.axes(first, second));
     let exact = f64::from(1e-4 * small + rounding) + 1e-4 * best.abs();
     let loose = if old { f64::from(2e-2 * preference(shape1).min(preference(shape2)) + rounding) } else { exact };
     let told = || {
@@ -241,33 +283,32 @@ fn check_pair(kinds: (usize, usize), (shape1, shape2): (&Shape, &Shape), pose: &
         format!("{names:?} {pose:?} margin {margin}: {:?}\n{shape1:?}\n{shape2:?}", found.points())
     };
     if found.points().is_empty() {
-        // The kernel's own axis proves the gap.
+        // The kernel's own axis proves the gap, or one near that from shape to shape: of a pebble beside the rim of a hall-sized
+        // dome the grid of directions does not know.
         let axis = closest(&pair.support1, &pair.support2, pose).map_or(f64::MIN, |c| pair.gap(c.normal.as_dvec3()));
-        assert!(best.max(axis) > f64::from(margin) - exact, "lost: {best} {axis} {}", told());
-        return;
+        let axis = axis.max(pair.climb(pair.position.normalize_or(DVec3::Y)));
+        return law(best.max(axis) > f64::from(margin) - exact, || format!("lost: {best} {axis} {}", told()));
     }
     let n = found.points()[0].normal;
-    assert!((n.length() - 1.0).abs() < 1e-5, "{}", told());
+    law((n.length() - 1.0).abs() < 1e-5, || format!("not unit: {}", told()))?;
     let (own, least) = (pair.gap(n.as_dvec3()), lowest(&found));
-    assert!(old || own >= best - exact, "not the least way out: {own} < {best} {}", told());
-    assert!(least >= best - loose, "too deep: {least} < {best} {}", told());
-    assert!(
-        if old { least >= own - loose } else { (least - own).abs() <= exact },
-        "separation {least}, not {own}: {}",
-        told()
-    );
+    law(old || own >= best - exact, || format!("not the least way out: {own} < {best} {}", told()))?;
+    law(least >= best - loose, || format!("too deep: {least} < {best} {}", told()))?;
+    let near = if old { least >= own - loose } else { (least - own).abs() <= exact };
+    law(near, || format!("wrong separation: {least}, not {own}: {}", told()))?;
     let turned = 2.0 * loose + f64::from(3e-7 * large);
     if least < f64::from(margin) - turned {
-        assert!(!mirrored.points().is_empty(), "mirrored lost: {}", told());
-        assert!(old || (lowest(&mirrored) - least).abs() <= turned, "mirrored: {:?} {}", mirrored.points(), told());
+        law(!mirrored.points().is_empty(), || format!("mirrored lost: {}", told()))?;
+        let same = old || (lowest(&mirrored) - least).abs() <= turned;
+        law(same, || format!("mirrored: {:?} {}", mirrored.points(), told()))?;
     }
     for p in found.points() {
-        assert!(p.point1.is_finite() && p.separation <= margin + exact as Real && p.normal == n, "{}", told());
-        assert_eq!(found.points().iter().filter(|q| q.feature == p.feature).count(), 1, "{}", told());
+        let within = p.point1.is_finite() && p.separation <= margin + exact as Real && p.normal == n;
+        law(within, || format!("beyond the margin: {}", told()))?;
+        let once = found.points().iter().filter(|q| q.feature == p.feature).count() == 1;
+        law(once, || format!("a feature twice: {}", told()))?;
     }
-    if !old {
-        check_surface(&pair, &found, (shape1, shape2), pose, &told);
-    }
+    if old { Ok(()) } else { check_surface(&pair, &found, (shape1, shape2), pose, &told) }
 }
 
 /// The points are on the surfaces: none outside, and of the nearest one none inside.
@@ -277,7 +318,7 @@ fn check_surface(
     (shape1, shape2): (&Shape, &Shape),
     pose: &Pose,
     told: &impl Fn() -> String,
-) {
+) -> Result<(), String> {
     let small = pair.support1.size().min(pair.support2.size());
     let dot = Support::Sphere(crate::shape::Sphere::new(1.0).unwrap());
     let large = shape1.reach().max(shape2.reach()) + pose.position.length();
@@ -288,14 +329,16 @@ fn check_surface(
             let support = Support::new(shape).unwrap();
             let outside = closest(&support, &dot, &Pose::from_position(point));
             let outside = outside.map_or(0.0, |c| c.distance - support.radius());
-            assert!(outside <= slack, "{point} is outside of {shape:?} by {outside}: {}", told());
+            law(outside <= slack, || format!("outside: {point} of {shape:?} by {outside}: {}", told()))?;
         }
         let n = p.normal.as_dvec3();
         if f64::from(p.separation) <= lowest(found) {
             let top = pair.support1.full_support(n).dot(n) - n.dot(p.point1.as_dvec3());
-            assert!(top.abs() <= f64::from(2e-4 * small + 1e-6 * large), "off the surface by {top}: {}", told());
+            let on = top.abs() <= f64::from(2e-4 * small + 1e-6 * large);
+            law(on, || format!("off the surface by {top}: {}", told()))?;
         }
     }
+    Ok(())
 }
 
 fn contacts(a: &Shape, b: &Shape, pose: &Pose, margin: Real) -> Manifold {
@@ -308,19 +351,38 @@ fn lowest(manifold: &Manifold) -> f64 {
     manifold.points().iter().fold(f64::MAX, |m, p| m.min(p.separation.into()))
 }
 
-fn check_all(case: &Case, count: usize) {
+/// Every kind against every kind, on two threads: what is wrong.
+fn find_wrong(case: &Case, count: usize) -> Vec<String> {
     let mut random = Random(0x5EED_0F0A_C1E5 ^ u64::from(case.thin.to_bits()) << 20 ^ u64::from(case.size2.to_bits()));
-    let mut pool = |size: Real| -> Vec<Vec<Shape>> {
+    let mut pool = |size: Real| -> Vec<Vec<Specimen>> {
         let some = count.clamp(4, 40);
-        (0..KINDS.len()).map(|kind| (0..some).map(|_| specimen(kind, size, case.thin, &mut random)).collect()).collect()
+        let mut kind = |kind| (0..some).map(|_| Specimen::new(kind, size, case.thin, &mut random)).collect();
+        (0..KINDS.len()).map(&mut kind).collect()
     };
     let (pool1, pool2) = (pool(case.size1), pool(case.size2));
-    for (first, shapes1) in pool1.iter().enumerate() {
-        for (second, shapes2) in pool2.iter().enumerate() {
-            let mut random = Random(0x00C0_FFEE + (first * 100 + second) as u64);
-            check((first, second), (shapes1, shapes2), case, count, &mut random);
+    let next = AtomicUsize::new(0);
+    let work = || {
+        let mut wrong = Vec::new();
+        loop {
+            let at = next.fetch_add(1, Ordering::Relaxed);
+            if at >= KINDS.len() * KINDS.len() {
+                return wrong;
+            }
+            let kinds = (at / KINDS.len(), at % KINDS.len());
+            wrong.extend(check(kinds, (&pool1[kinds.0], &pool2[kinds.1]), case, count));
         }
-    }
+    };
+    let wrong: Vec<String> = std::thread::scope(|scope| {
+        let threads = [(); 2].map(|()| scope.spawn(work));
+        threads.into_iter().flat_map(|thread| thread.join().unwrap()).collect()
+    });
+    println!("{} pairs, {} wrong", count * KINDS.len() * KINDS.len(), wrong.len());
+    wrong
+}
+
+fn check_all(cases: &[(&Case, usize)]) {
+    let wrong: Vec<String> = cases.iter().flat_map(|(case, count)| find_wrong(case, *count)).collect();
+    assert!(wrong.is_empty(), "{} pairs are wrong:\n{}", wrong.len(), wrong[..wrong.len().min(20)].join("\n\n"));
 }
 
 const USUAL: Case = Case { size1: 1.0, size2: 0.8, thin: 5.0, deep: 1.0 };
@@ -332,30 +394,69 @@ const DEEP: Case = Case { size1: 1.0, size2: 0.7, thin: 5.0, deep: 2.5 };
 
 #[test]
 fn every_kind_against_every_kind() {
-    check_all(&USUAL, 24);
+    check_all(&[(&USUAL, 72)]);
 }
 
 #[test]
 fn thin_shapes() {
-    check_all(&THIN, 12);
+    check_all(&[(&THIN, 40)]);
 }
 
 #[test]
 fn tiny_and_huge_shapes() {
-    check_all(&TINY, 8);
-    check_all(&HUGE, 8);
-    check_all(&TINY_ON_HUGE, 8);
+    check_all(&[(&TINY, 24), (&HUGE, 24), (&TINY_ON_HUGE, 24)]);
 }
 
 #[test]
 fn deep_overlaps() {
-    check_all(&DEEP, 12);
+    check_all(&[(&DEEP, 40)]);
+}
+
+/// A triangle on a level edge exactly on a box has the ends of the edge for points, though its face leans over it.
+#[test]
+fn an_edge_that_just_touches_has_two_points() {
+    let block = Shape::cuboid(Vec3::new(0.4, 0.25, 0.416_333)).unwrap();
+    let sail = Shape::triangle([Vec3::ZERO, Vec3::X * 0.6, Vec3::new(0.2, 0.6, 0.55)]).unwrap();
+    let pose = Pose::from_position(Vec3::new(-0.3, -0.1, 0.416_333));
+    let found = contacts(&block, &sail, &pose, 0.0);
+    assert_eq!(found.points().len(), 2, "{found:?}");
+    for p in found.points() {
+        assert!((p.point1.y + 0.1).abs() < 1e-6 && (p.point1.x.abs() - 0.3).abs() < 1e-6, "{p:?}");
+    }
+}
+
+/// Two prisms of diamonds that meet edge to parallel edge share the stretch between their ends, whichever faces are chosen.
+#[test]
+fn parallel_edges_share_a_stretch() {
+    let corner = |k: u32| {
+        Vec3::new(
+            [0.5, -0.5][k as usize & 1],
+            [0.3, 0.0, -0.3, 0.0][k as usize >> 1],
+            [0.0, 0.3, 0.0, -0.3][k as usize >> 1],
+        )
+    };
+    let prism = Shape::point_cloud(&(0..8).map(corner).collect::<Vec<_>>()).unwrap();
+    for gap in [0.001, 0.005] {
+        for shift in [-0.2, 0.3] {
+            let found = contacts(&prism, &prism, &Pose::from_position(Vec3::new(shift, 0.6 + gap, 0.0)), 0.01);
+            let ends = [max(-0.5, shift - 0.5), min(0.5, shift + 0.5)];
+            for end in ends {
+                let near = |p: &ManifoldPoint| (p.point1 - Vec3::new(end, 0.3, 0.0)).length() < 1e-3;
+                assert!(found.points().iter().any(near), "nothing at {end}: {found:?}");
+            }
+            assert!(found.points().iter().all(|p| (p.separation - gap).abs() < 1e-5), "{found:?}");
+        }
+    }
 }
 
 #[test]
-#[ignore = "minutes: two million pairs"]
+#[ignore = "minutes: 1.4 million pairs"]
 fn every_kind_against_every_kind_in_full() {
-    for (case, share) in [(&USUAL, 3), (&THIN, 2), (&TINY, 1), (&HUGE, 1), (&TINY_ON_HUGE, 1), (&DEEP, 2)] {
-        check_all(case, 1000 * share);
-    }
+    check_all(&[(&USUAL, 3000), (&THIN, 2000), (&DEEP, 2000)]);
+}
+
+#[test]
+#[ignore = "minutes: 0.6 million pairs"]
+fn tiny_and_huge_shapes_in_full() {
+    check_all(&[(&TINY, 1000), (&HUGE, 1000), (&TINY_ON_HUGE, 1000)]);
 }

@@ -3,7 +3,7 @@
 use crate::math::{Aabb, Pose, Real, Vec3};
 use crate::shape::{
     Capsule, Cone, ConvexHull, Cuboid, Custom, Cylinder, FLAT_SINE, Feature, Geometry, PointCloud, Rounded, Shape,
-    Sphere, TaperedCapsule, Transformed, triangle_feature,
+    Sphere, TaperedCapsule, Transformed, triangle_edge, triangle_feature,
 };
 use glam::DVec3;
 
@@ -251,6 +251,46 @@ impl<'a> Support<'a> {
             Self::Custom(s) => s.feature(d, out),
             Self::Points(_) | Self::Slim { .. } => out.push(self.full_support(d.as_dvec3()).as_vec3()),
         }
+    }
+
+    /// The edge that lies most level to a unit direction at the furthest point along it; nothing where there is none.
+    pub(crate) fn edge(&self, direction: Vec3, out: &mut Feature) {
+        match self {
+            Self::Capsule(_) | Self::Cylinder(_) | Self::Cone(_) | Self::TaperedCapsule(_) => {
+                self.feature(direction, out);
+                if out.points().len() > 2 {
+                    *out = Feature::default();
+                }
+            }
+            Self::Cuboid(s) => polyhedron_edge(&CuboidFeatures::new(s).view(), direction, out),
+            Self::Hull(s) => polyhedron_edge(&Polyhedron::from_hull(s), direction, out),
+            Self::Triangle(corners) => triangle_edge(*corners, direction, out),
+            Self::Cloud(s) => s.edge(direction, out),
+            Self::Rounded(s) => s.edge(direction, out),
+            Self::Transformed(s) => s.edge(direction, out),
+            Self::Sphere(_) | Self::Custom(_) | Self::Points(_) | Self::Scaled { .. } => {}
+        }
+    }
+}
+
+/// Of the edges at the corner furthest along `d` the one that lies most level, if it lies level at all.
+fn polyhedron_edge(solid: &Polyhedron<'_>, d: Vec3, out: &mut Feature) {
+    let corner = solid.lowest_corner(-d);
+    let (mut best, mut least) = (None, FLAT_SINE);
+    for &face in solid.faces_around(corner) {
+        for edge in solid.face_loop(face as usize).filter(|&edge| solid.edges[edge].origin as usize == corner) {
+            let (a, b) = solid.edge_points(edge);
+            let slope = d.dot(a - b) / (a - b).length();
+            if slope < least {
+                (best, least) = (Some(edge), slope);
+            }
+        }
+    }
+    // Of its two half edges always the same, so that its ends keep their order when both are as far.
+    if let Some(edge) = best {
+        let (a, b) = solid.edge_points(edge & !1);
+        out.push(a);
+        out.push(b);
     }
 }
 

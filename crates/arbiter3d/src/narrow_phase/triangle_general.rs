@@ -340,7 +340,8 @@ impl Pair<'_> {
         };
         self.shape.support.feature(-touch.normal, &mut other);
         let mut manifold = Manifold::EMPTY;
-        touch.patch(placed, (&own, &other), (self.reach.margin, self.shape.size), &mut manifold);
+        let patch = touch.patch(placed, (&own, &other), (self.reach.margin, self.shape.size));
+        touch.hand_on(placed, &patch, self.shape.size, &mut manifold);
         for &ManifoldPoint { point1, normal, separation, feature } in manifold.points() {
             let feature = RIM + ((number as u32) << 24 ^ feature);
             out.push(self.triangle.rim_candidate(point1, normal, separation, feature));

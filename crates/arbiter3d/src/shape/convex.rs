@@ -2,7 +2,7 @@
 
 use super::mass::Moments;
 use super::{MassProperties, ShapeError};
-use crate::math::{Real, Vec3, tangents};
+use crate::math::{Real, Vec3, clamp, tangents};
 use crate::narrow_phase::Support;
 use glam::DVec3;
 
@@ -46,11 +46,25 @@ impl Feature {
         &mut self.points[..self.count]
     }
 
-    /// The disc about the y axis at height `y`, which looks along `d`. Where it clearly leans, one corner is the point of the
-    /// rim that is furthest along `d`; nearly level its corners stay where they are on the body, so that rest is rest.
+    /// The disc about the y axis at height `y`, which looks along `d`. Where it leans, one corner is the point of the rim that
+    /// is furthest along `d`; level its corners stay where they are on the body, so that rest is rest. In between they turn
+    /// from the one to the other.
     pub fn set_disc(&mut self, y: Real, radius: Real, d: Vec3) {
         let across = (d.x * d.x + d.z * d.z).sqrt();
-        let (cosine, sine) = if across > LEANING { (d.x / across, d.z / across) } else { (1.0, 0.0) };
+        let share = clamp((across - LEVEL) / (LEANING - LEVEL), 0.0, 1.0);
+        let (cosine, sine) = if share <= 0.0 {
+            (1.0, 0.0)
+        } else if share >= 1.0 {
+            (d.x / across, d.z / across)
+        } else {
+            // Of the four corners that carry the disc the nearest is turned there: which corner is which stays.
+            let along_x = d.x.abs() >= d.z.abs();
+            let sign = if (if along_x { d.x } else { d.z }) < 0.0 { -1.0 } else { 1.0 };
+            let (near, aside) = if along_x { (d.x * sign, d.z * sign) } else { (d.z * sign, -d.x * sign) };
+            let (x, z) = (1.0 + (near / across - 1.0) * share, aside / across * share);
+            let length = (x * x + z * z).sqrt();
+            (x / length, z / length)
+        };
         let turn = if d.y > 0.0 { -1.0 } else { 1.0 };
         for (c, s) in SIXTEENTHS {
             let (x, z) = (c * cosine - s * turn * sine, c * sine + s * turn * cosine);
@@ -67,8 +81,9 @@ impl Feature {
     }
 }
 
-/// A disc leans whose axis is off the direction by more than this sine.
-const LEANING: Real = 0.02;
+/// A disc is level whose axis is off the direction by no more than this sine, and leans beyond the other one.
+const LEVEL: Real = 1e-5;
+const LEANING: Real = 5e-5;
 
 /// Cosines and sines of the sixteenths of a turn.
 const SIXTEENTHS: [(Real, Real); FEATURE_POINTS] = {

@@ -75,7 +75,7 @@ pub(crate) use surface::Surface;
 pub use tapered_capsule::TaperedCapsule;
 pub use transformed::Transformed;
 pub use triangle::Triangle;
-pub(crate) use triangle::triangle_feature;
+pub(crate) use triangle::{triangle_edge, triangle_feature};
 pub use voxels::VoxelGrid;
 
 use crate::math::{Aabb, Mat3, Pose, Real, Vec3};
@@ -568,6 +568,16 @@ impl Shape {
             Self::Cuboid(s) => s.half_extents().min_element(),
             Self::Hull(s) => s.inner_radius(),
             other => other.inner_ball().1,
+        }
+    }
+
+    /// Whether the point that it touches with moves along its surface as it turns, otherwise than a sphere's or a capsule's.
+    pub(crate) fn is_curved(&self) -> bool {
+        match self {
+            Self::Cylinder(_) | Self::Cone(_) | Self::TaperedCapsule(_) | Self::Custom(_) => true,
+            Self::Rounded(s) => s.core().is_curved(),
+            Self::Transformed(s) => matches!(s.shape(), Self::Sphere(_) | Self::Capsule(_)) || s.shape().is_curved(),
+            _ => false,
         }
     }
 

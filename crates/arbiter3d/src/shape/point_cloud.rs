@@ -5,7 +5,7 @@
 //! ([`ConvexHull`](super::ConvexHull)) is faster in contacts where the points have volume and their hull at most 255
 //! corners.
 
-use super::convex::{FEATURE_POINTS, Feature, sampled_feature, sphere_grid};
+use super::convex::{FEATURE_POINTS, FLAT_SINE, Feature, sampled_feature, sphere_grid};
 use super::geometry::Geometry;
 use super::inside::Inside;
 use super::{ConvexHull, MassProperties, ShapeError};
@@ -93,28 +93,47 @@ impl PointCloud {
         }
     }
 
+    /// The edge that a plane through the furthest point along `d` meets first when it is tilted about it.
+    pub(crate) fn edge(&self, d: Vec3, out: &mut Feature) {
+        let d = d.as_dvec3();
+        let (_, top) = outermost(&self.points, d);
+        let Some(way) = self.least_tilt(top, d, &|way| (way - d * d.dot(way)).length()) else { return };
+        let slope = -d.dot(way) / way.length();
+        if slope < f64::from(FLAT_SINE) {
+            // Its ends keep their order when both are as far.
+            let [a, b] = [top.as_vec3(), (top + way).as_vec3()];
+            let swapped = (b.x, b.y, b.z) < (a.x, a.y, a.z);
+            let [a, b] = if swapped { [b, a] } else { [a, b] };
+            out.push(a);
+            out.push(b);
+        }
+    }
+
+    /// The way to the point that a plane through `top` with this normal meets first, tilted so that points sink by as much as
+    /// they are aside.
+    fn least_tilt(&self, top: DVec3, normal: DVec3, aside: &dyn Fn(DVec3) -> f64) -> Option<DVec3> {
+        let (mut best, mut slope) = (None, f64::MIN);
+        for point in &self.points {
+            let way = point.as_dvec3() - top;
+            let far = aside(way);
+            // Points on the edge itself have no side.
+            if far > 1e-6 * way.length() && normal.dot(way) > slope * far {
+                (best, slope) = (Some(way), normal.dot(way) / far);
+            }
+        }
+        best
+    }
+
     /// Normal of the hull's face that a plane through `top` square to `d` meets first: tilted about the point towards
     /// the one that takes the least tilt, then turned about the edge to that, to the side where the face looks more
     /// along `d`.
     fn face_around(&self, top: DVec3, d: DVec3) -> Option<DVec3> {
-        let least = |normal: DVec3, aside: &dyn Fn(DVec3) -> f64| {
-            let (mut best, mut slope) = (None, f64::MIN);
-            for point in &self.points {
-                let way = point.as_dvec3() - top;
-                let far = aside(way);
-                // Points on the edge itself have no side.
-                if far > 1e-6 * way.length() && normal.dot(way) > slope * far {
-                    (best, slope) = (Some(way), normal.dot(way) / far);
-                }
-            }
-            best
-        };
-        let edge = least(d, &|way| (way - d * d.dot(way)).length())?;
+        let edge = self.least_tilt(top, d, &|way| (way - d * d.dot(way)).length())?;
         let across = edge.cross(d).normalize_or_zero();
         let tilted = across.cross(edge).normalize_or_zero();
         let mut found: Option<DVec3> = None;
         for side in [across, -across] {
-            let Some(way) = least(tilted, &|way| side.dot(way)) else { continue };
+            let Some(way) = self.least_tilt(top, tilted, &|way| side.dot(way)) else { continue };
             let normal = edge.cross(way).normalize_or_zero();
             let normal = if normal.dot(tilted) < 0.0 { -normal } else { normal };
             if found.is_none_or(|other| normal.dot(d) > other.dot(d) + 1e-3) {

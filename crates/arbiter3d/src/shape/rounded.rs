@@ -57,6 +57,14 @@ impl Rounded {
         }
         out.points_mut().iter_mut().for_each(|point| *point += d * self.radius);
     }
+
+    /// The core's most level edge, moved out.
+    pub(crate) fn edge(&self, d: Vec3, out: &mut Feature) {
+        if let Some(core) = Support::new(&self.core) {
+            core.edge(d, out);
+        }
+        out.points_mut().iter_mut().for_each(|point| *point += d * self.radius);
+    }
 }
 
 impl Geometry for Rounded {

@@ -113,12 +113,29 @@ impl Transformed {
     }
 
     pub(crate) fn feature(&self, d: Vec3, out: &mut Feature) {
-        let local = self.linear.transpose() * d;
         if let Some(inner) = Support::new(&self.shape) {
-            inner.feature(local * (1.0 / local.length()), out);
+            inner.feature(self.before(d), out);
         }
+        self.map(out);
+    }
+
+    /// The image of the most level edge.
+    pub(crate) fn edge(&self, d: Vec3, out: &mut Feature) {
+        if let Some(inner) = Support::new(&self.shape) {
+            inner.edge(self.before(d), out);
+        }
+        self.map(out);
+    }
+
+    /// The unit direction before the map whose level planes become those of `d`.
+    fn before(&self, d: Vec3) -> Vec3 {
+        let local = self.linear.transpose() * d;
+        local * (1.0 / local.length())
+    }
+
+    fn map(&self, feature: &mut Feature) {
         let mirrored = self.linear.determinant() < 0.0;
-        let points = out.points_mut();
+        let points = feature.points_mut();
         points.iter_mut().for_each(|point| *point = self.linear * *point + self.translation);
         if mirrored {
             points.reverse();

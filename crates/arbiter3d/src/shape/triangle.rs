@@ -63,6 +63,11 @@ pub(crate) fn triangle_feature([a, b, c]: [Vec3; 3], d: Vec3, out: &mut Feature)
         [a, second, third].into_iter().for_each(|corner| out.push(corner));
         return;
     }
+    triangle_edge([a, b, c], d, out);
+}
+
+/// The edge that lies most square to a unit direction, or the corner that is furthest along it.
+pub(crate) fn triangle_edge([a, b, c]: [Vec3; 3], d: Vec3, out: &mut Feature) {
     // The edge that lies most square to the direction, of those at the furthest corner.
     let mut corners = [a, b, c];
     let along = corners.map(|p| p.dot(d));
