@@ -198,10 +198,8 @@ impl Touch {
         if distance > lift {
             return self.point1;
         }
-        match placed.moved(normal * (lift - distance)).nearness(f64::INFINITY) {
-            Nearness::Gap(Gap { point1, .. }) => point1 + normal * radius1,
-            _ => self.point1,
-        }
+        let apart = placed.gap_after(normal * (lift - distance));
+        apart.map_or(self.point1, |gap| gap.point1 + normal * radius1)
     }
 }
 

@@ -268,7 +268,7 @@ impl<'a> Support<'a> {
             Self::Cloud(s) => s.edge(direction, out),
             Self::Rounded(s) => s.edge(direction, out),
             Self::Transformed(s) => s.edge(direction, out),
-            Self::Sphere(_) | Self::Custom(_) | Self::Points(_) | Self::Scaled { .. } => {}
+            Self::Sphere(_) | Self::Custom(_) | Self::Points(_) | Self::Slim { .. } => {}
         }
     }
 }
