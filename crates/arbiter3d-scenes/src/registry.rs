@@ -270,6 +270,12 @@ pub static SCENES: &[Scene] = &[
         build: scenes::fast::spinning_rods,
     },
     Scene {
+        name: "high_speed_kinds",
+        description: "hammers, rings, voxels and needles at 100 m/s in a room with walls of 1 cm, and a fast paddle",
+        size: Size::new("bodies", 200, 10_000),
+        build: scenes::fast::high_speed_kinds,
+    },
+    Scene {
         name: "ramps",
         description: "boxes with friction 0, 0.1, … 1 on a slope of 30°: those above 0.577 stick",
         size: Size::FIXED,
