@@ -29,7 +29,7 @@ const GOLDEN: [(&str, u64); 10] = [
     ("surfaces", 0x6ebd_7724_4afd_b709),
     ("rods and bullets", 0x09fd_da73_6a9a_6e4e),
     ("compounds and voxels", 0xe396_1b42_375d_65a9),
-    ("mixed convex", 0xf83c_adbd_5d31_ed03),
+    ("mixed convex", 0xef41_6d04_2ce2_ba6d),
 ];
 
 /// A scene: how it begins, and what is done before each step.
