@@ -104,15 +104,11 @@ pub(crate) fn collide_on(
 ) {
     if rank(shape1) >= rank(shape2) {
         collide_sorted(level, (shape1, shape2), pose, margin, (cache, manifold));
-    } else if rank(shape2) != GENERAL {
-        collide_sorted(level, (shape2, shape1), &pose.inverse(), margin, (cache, manifold));
-        mirror(pose, manifold);
-    } else if matches!(shape1, Shape::Sphere(_)) {
-        collide_sorted(level, (shape2, shape1), &exact_inverse(pose), margin, (cache, manifold));
-        mirror(pose, manifold);
     } else {
-        // Either order is the same to it, and this one needs no inverse, which would cost a pebble on a hall its last digits.
-        general::collide((shape1, shape2), pose, margin, manifold);
+        // The plain inverse would cost a pebble on a hall its last digits.
+        let inverse = if rank(shape2) == GENERAL { exact_inverse(pose) } else { pose.inverse() };
+        collide_sorted(level, (shape2, shape1), &inverse, margin, (cache, manifold));
+        mirror(pose, manifold);
     }
 }
 
