@@ -309,6 +309,22 @@ mod tests {
         }
     }
 
+    /// The formulas of rounded boxes and cylinders are those of their support points, to what those are good for.
+    #[test]
+    fn rounded_shapes_have_the_mass_of_their_surface() {
+        for core in [Shape::cuboid(Vec3::new(0.3, 0.5, 0.7)), Shape::cylinder(0.6, 0.3)] {
+            let rounded = Shape::rounded(&core.unwrap(), 0.2).unwrap();
+            let found = rounded.mass_properties(1.0).unwrap();
+            let sampled = super::super::convex::mass_of_support(&crate::narrow_phase::Support::new(&rounded).unwrap());
+            let sampled = sampled.unwrap();
+            let near = |x: Real, y: Real| assert!((x - y).abs() < 3e-4 * y, "{x} {y}");
+            near(found.mass, sampled.mass);
+            near(found.inertia.xx, sampled.inertia.xx);
+            near(found.inertia.yy, sampled.inertia.yy);
+            near(found.inertia.zz, sampled.inertia.zz);
+        }
+    }
+
     /// A tapered capsule, cut into thin discs.
     #[test]
     fn a_tapered_capsule_has_the_mass_of_its_slices() {
