@@ -20,16 +20,16 @@ use common::*;
 
 /// The hashes of the scenes, in their order.
 const GOLDEN: [(&str, u64); 10] = [
-    ("pile", 0x7e9c_c0ad_5a70_2769),
-    ("hulls", 0x7d4f_1a72_0999_6ad2),
-    ("mesh rain", 0x1b5e_0c9b_a984_9a39),
-    ("bullets", 0x8856_6650_05ad_3a01),
+    ("pile", 0x7900_4ca1_ad6b_f33e),
+    ("hulls", 0x9585_7ac8_52b6_5294),
+    ("mesh rain", 0x87dc_1ae7_9d07_7975),
+    ("bullets", 0x58e8_5b75_27e2_59f9),
     ("custom contacts", 0x770f_f93e_d37a_7820),
-    ("coming and going", 0x175a_6cdf_bc22_934d),
-    ("surfaces", 0x6ebd_7724_4afd_b709),
-    ("rods and bullets", 0x09fd_da73_6a9a_6e4e),
-    ("compounds and voxels", 0xe396_1b42_375d_65a9),
-    ("mixed convex", 0x3bad_58dc_e107_d90a),
+    ("coming and going", 0x7eff_2b8f_e9a6_c79a),
+    ("surfaces", 0x7a63_2e07_7542_d659),
+    ("rods and bullets", 0xe3ce_b168_90b1_67f8),
+    ("compounds and voxels", 0x48c4_0030_e3f9_27d9),
+    ("mixed convex", 0x91c6_fdf8_4a6e_507b),
 ];
 
 /// A scene: how it begins, and what is done before each step.
