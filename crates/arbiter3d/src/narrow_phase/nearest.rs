@@ -29,7 +29,8 @@ use glam::{DMat3, DVec2, DVec3};
 const SAME: f64 = 1e-5;
 /// A point is over a face although it is beyond its sides by this share of its distance from the origin.
 const BESIDE: f64 = 1e-8;
-/// Points on both sides that are a distance apart are on them within this share of their distance from the origin.
+/// Points on both sides that are a distance apart are on them within this share of how far they are from the middle of
+/// core 2, which a rotation in single precision stretches.
 const STRETCH: f64 = 1e-6;
 /// Axes whose angle has a sine with a smaller square are parallel.
 const PARALLEL: f64 = 1e-6;
@@ -323,8 +324,9 @@ fn axis(core: &Core<'_>) -> Option<(f64, f64)> {
 fn is_between(placed: &Placed<'_>, point1: DVec3, normal: DVec3, (gap, distance): (f64, f64)) -> bool {
     let [core1, core2] = placed.cores();
     let local = |point: DVec3| placed.turn_back(point - placed.position());
-    // A rotation in single precision stretches a little.
-    let slack = STRETCH * (point1.x.abs() + point1.y.abs() + point1.z.abs());
+    let sum = |v: DVec3| v.x.abs() + v.y.abs() + v.z.abs();
+    let length2 = axis(core2).map_or(0.0, |(half_length, _)| half_length);
+    let slack = BESIDE * sum(point1) + STRETCH * (sum(point1 - placed.position()) + length2);
     if distance >= 0.0 {
         let point2 = local(point1 + normal * distance);
         return gap >= distance - slack
