@@ -23,13 +23,13 @@ const GOLDEN: [(&str, u64); 10] = [
     ("pile", 0x7900_4ca1_ad6b_f33e),
     ("hulls", 0x9585_7ac8_52b6_5294),
     ("mesh rain", 0x87dc_1ae7_9d07_7975),
-    ("bullets", 0x58e8_5b75_27e2_59f9),
+    ("bullets", 0x8279_b06e_ccde_a574),
     ("custom contacts", 0x770f_f93e_d37a_7820),
     ("coming and going", 0x7eff_2b8f_e9a6_c79a),
-    ("surfaces", 0x7a63_2e07_7542_d659),
-    ("rods and bullets", 0xe3ce_b168_90b1_67f8),
-    ("compounds and voxels", 0x48c4_0030_e3f9_27d9),
-    ("mixed convex", 0x91c6_fdf8_4a6e_507b),
+    ("surfaces", 0xeb22_bb48_fcb0_5b56),
+    ("rods and bullets", 0xfa79_aa4a_ba26_41ae),
+    ("compounds and voxels", 0xc5c0_23af_6662_3b6f),
+    ("mixed convex", 0x4395_b9ca_88c9_53b1),
 ];
 
 /// A scene: how it begins, and what is done before each step.

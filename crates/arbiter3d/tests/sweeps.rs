@@ -200,26 +200,6 @@ fn a_spinning_paddle_strikes_what_is_slow() {
     }
 }
 
-/// A rod that lies on a floor and spins fast upright, so that the floor holds its ends, goes on along the floor.
-#[test]
-fn what_is_held_by_its_turning_goes_on() {
-    let mut world = world();
-    floor(&mut world, 0.0);
-    let mut slowest = f32::MAX;
-    for at in 0..20 {
-        let rod = BodyDefinition::dynamic().at(Vec3::new(-50.0, 0.012, 3.0 * at as f32));
-        let rod = rod.rotated(turn(Vec3::X, 90.0)).moving(Vec3::X * 20.0, Vec3::X * (20.0 + 8.0 * at as f32));
-        let rod = add(&mut world, &rod, &ShapeDefinition::new(capsule(1.0, 0.01)).friction(0.0));
-        for step in 1..=6 {
-            world.step(DT).unwrap();
-            let way = position(&world, rod).x + 50.0;
-            slowest = slowest.min(way / (20.0 * DT * step as f32));
-        }
-        world.remove_body(rod).unwrap();
-    }
-    assert!(slowest > 0.99, "{slowest} of the way");
-}
-
 /// Hits of balls that fall: the speed is √(2gh) to a hundredth of a m/s, also where continuous collision has stopped them in
 /// between, at all phases of the step; the impulse is m v, and the weight for what is left of the step.
 #[test]
