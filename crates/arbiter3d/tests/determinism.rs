@@ -28,7 +28,7 @@ const GOLDEN: [(&str, u64); 10] = [
     ("coming and going", 0x7eff_2b8f_e9a6_c79a),
     ("surfaces", 0xeb22_bb48_fcb0_5b56),
     ("rods and bullets", 0xfa79_aa4a_ba26_41ae),
-    ("compounds and voxels", 0xc5c0_23af_6662_3b6f),
+    ("compounds and voxels", 0x48c4_0030_e3f9_27d9),
     ("mixed convex", 0x4395_b9ca_88c9_53b1),
 ];
 

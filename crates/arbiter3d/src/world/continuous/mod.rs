@@ -4,7 +4,8 @@
 //! shapes, piece by piece ([`piece`]), are swept from where they were to where they are ([`way`]) against the static tree and the
 //! kinematic shapes; at the first impact the body stays where it came within a slop of touching, with the velocity that it had
 //! there. Contact is then found in the next step, which turns the velocity away. The rest of the step's motion is lost: to go on
-//! would be to leave the place where it hits. (Bullets lose nothing: see [`bullets`].)
+//! would be to leave the place where it hits. (Bullets lose nothing: see [`bullets`].) Only a body of
+//! many pieces that was in contact already goes on, along what holds it: some of its pieces may be held in every step.
 //!
 //! Every piece has a core, which is thinner by half its inner radius. Only a shape whose core would hit is stopped:
 //! what merely slides or rolls on a floor comes near ever new triangles of it, and must not be held. A shape that comes from
@@ -48,6 +49,14 @@ use mover::{Mover, is_fast};
 pub(super) use piece::depth_on_body;
 use piece::{Piece, each_piece, has_pieces};
 use way::{Way, turned_back};
+
+/// How far a body goes on at most along what holds it in a step, in speculative distances: a metre by default. What would go
+/// farther stays: the contact that it has had says little of what it would slide on.
+const MOST_SLIDE: Real = 50.0;
+/// How often a body goes on along what holds it in a step.
+const MOST_SLIDES: usize = 4;
+/// Share of its way that a body has to get on for its turn to go on too.
+const LEAST_PROGRESS: Real = 1e-3;
 
 /// A body that may have passed through something, and the pose of its centre of mass when the step began.
 #[derive(Clone, Copy, Debug)]
@@ -308,6 +317,9 @@ impl ImpactSearch<'_> {
         let first = self.first_stop(slots, &way, self.kinematic)?;
         let (time, normal) = (first.hit.time, first.hit.normal);
         let Some(carried) = first.carried else {
+            if first.hit.touches && slots.iter().any(|&slot| has_pieces(&self.shapes[slot as usize].geometry)) {
+                return Some(self.slide(body, &way, first.hit));
+            }
             // What a contact has held for all of the step has gained nothing.
             return Some(Held { at: way.at(time), normal, lost: if first.hit.touches { 0.0 } else { 1.0 - time } });
         };
@@ -315,6 +327,39 @@ impl ImpactSearch<'_> {
         let rest = Way::new(way.at(time), carried, turn * (1.0 - time));
         let at = self.first_stop(slots, &rest, &[]).map_or(carried, |stop| rest.at(stop.hit.time));
         Some(Held { at, normal, lost: 0.0 })
+    }
+
+    /// Lets a body of many pieces go on along what holds it. It has had a contact with that for all of the step, so its velocity is what the
+    /// contact has made of it; only what is new (of a body that comes from afar) has to be met where it is.
+    ///
+    /// What is left of the way has its part towards the obstacle taken out; where turning alone is what is held, the body
+    /// goes on without it.
+    fn slide(&self, body: &Body, way: &Way, hit: Hit) -> Held {
+        let slots = &body.shape_slots;
+        let free = body.locked_axes.free().0;
+        let (mut way, mut hit, mut normals) = (*way, hit, [Vec3::ZERO; MOST_SLIDES]);
+        for at in 0..MOST_SLIDES {
+            let here = way.at(hit.time);
+            let left = 1.0 - hit.time;
+            normals[at] = hit.normal;
+            let along = free * along_all((way.end.position - way.start.position) * left, &normals[..=at]);
+            if along.length() > MOST_SLIDE * self.settings.speculative_distance {
+                return Held { at: here, normal: hit.normal, lost: 0.0 };
+            }
+            // What is held at once is held by its turning, or by more than one obstacle.
+            let turns = hit.time > LEAST_PROGRESS && at + 2 < MOST_SLIDES;
+            let (rotation, turn) =
+                if turns { (way.end.rotation, way.turn * left) } else { (here.rotation, Vec3::ZERO) };
+            way = Way::new(here, Pose::new(here.position + along, rotation), turn);
+            match self.first_stop(slots, &way, self.kinematic) {
+                None => return Held { at: way.end, normal: hit.normal, lost: 0.0 },
+                Some(stop) if stop.carried.is_some() || !stop.hit.touches => {
+                    return Held { at: way.at(stop.hit.time), normal: stop.hit.normal, lost: 0.0 };
+                }
+                Some(stop) => hit = stop.hit,
+            }
+        }
+        Held { at: way.at(hit.time), normal: hit.normal, lost: 0.0 }
     }
 
     /// The first impact of the shapes of a body on its way.
@@ -579,4 +624,19 @@ fn earlier(a: Option<Hit>, b: Option<Hit>) -> Option<Hit> {
         (Some(a), Some(b)) => Some(if b.time < a.time { b } else { a }),
         (a, b) => a.or(b),
     }
+}
+
+/// What of a way is left that goes into none of the obstacles with these normals: along the last, or along the edge of two.
+fn along_all(way: Vec3, normals: &[Vec3]) -> Vec3 {
+    let Some((last, before)) = normals.split_last() else { return way };
+    let mut along = way - *last * min(way.dot(*last), 0.0);
+    for normal in before {
+        if along.dot(*normal) < 0.0 {
+            let edge = last.cross(*normal);
+            let squared = edge.length_squared();
+            along = if squared > 1e-6 { edge * (along.dot(edge) / squared) } else { Vec3::ZERO };
+        }
+    }
+    // Into a corner of three.
+    if before.iter().any(|normal| along.dot(*normal) < -1e-5 * way.length()) { Vec3::ZERO } else { along }
 }
