@@ -6,7 +6,9 @@ use super::{Ask, Engine, State, beyond_peers, rolling_resistance};
 use crate::queries::{BALL, BOX, tilt};
 use crate::scene::{Body, Scene};
 use arbiter3d::math::{Quat, Real, Rotation, Vec3};
-use arbiter3d::{BodyKind, CombineRule, ConvexHull, HeightField, LockedAxes, Shape, ShapeDefinition, TriangleMesh, WorldSettings};
+use arbiter3d::{
+    BodyKind, CombineRule, ConvexHull, HeightField, LockedAxes, Shape, ShapeDefinition, TriangleMesh, WorldSettings,
+};
 use boxddd_sys::ffi;
 use std::collections::HashMap;
 use std::ffi::{CStr, c_char, c_int, c_void};
