@@ -159,7 +159,7 @@ fn mixed(at: usize) -> Shape {
     }
 }
 
-/// Two hundred of all kinds come to rest on a wavy mesh: above it, hardly sunk in, all asleep.
+/// Two hundred of all kinds come to rest on a wavy mesh: above it, hardly sunk in, asleep but for one at most.
 #[test]
 fn mixed_shapes_rest_on_waves() {
     let mut world = world();

@@ -175,7 +175,7 @@ fn unit(v: DVec3) -> Vec3 {
     v.as_vec3()
 }
 
-fn larger(a: f64, b: f64) -> f64 {
+pub(super) fn larger(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 

@@ -26,7 +26,7 @@
 //! All in `f64`, as in `distance`.
 
 use super::cores::smaller;
-use super::distance::{Gap, Placed, Settled, Simplex, tangents};
+use super::distance::{Gap, Placed, Settled, Simplex, larger, tangents};
 use glam::DVec3;
 
 /// A face is on the boundary if the set reaches past it by less than this share of the size.
@@ -300,10 +300,6 @@ fn is_proved(placed: &Placed<'_>, way: &Way, tolerance: f64) -> bool {
     let middle = (point1 + way.point2) * 0.5;
     let (a, b) = (inner1(middle), inner2(middle));
     a >= 0.0 && b >= 0.0 && a + b >= wanted
-}
-
-fn larger(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
 }
 
 /// The corners of a search that ended in a tetrahedron around the origin, if it is not flat.

@@ -290,7 +290,7 @@ pub(crate) struct Held {
 struct Hit {
     /// Share of the way, 0 to 1.
     time: Real,
-    /// Unit vector from that shape, in its frame.
+    /// Unit vector from that shape, in its frame until it is turned.
     normal: Vec3,
     /// Whether there was a contact when the way began.
     touches: bool,
@@ -329,8 +329,8 @@ impl ImpactSearch<'_> {
         Some(Held { at, normal, lost: 0.0 })
     }
 
-    /// Lets a body of many pieces go on along what holds it. It has had a contact with that for all of the step, so its velocity is what the
-    /// contact has made of it; only what is new (of a body that comes from afar) has to be met where it is.
+    /// Lets a body of many pieces go on along what holds it. It has had a contact with that for all of the step, so its
+    /// velocity is what the contact has made of it; only what is new (of a body that comes from afar) has to be met where it is.
     ///
     /// What is left of the way has its part towards the obstacle taken out; where turning alone is what is held, the body
     /// goes on without it.
