@@ -98,6 +98,7 @@ impl World {
     /// Stops fast bodies at the first static or kinematic shapes on their ways, and has fast kinematic bodies take along what
     /// they would sweep over.
     pub(crate) fn stop_at_impacts(&mut self, fast: &mut Vec<FastBody>) {
+        self.flight.held.clear();
         let swept_over = self.kinematic_sweeps();
         if fast.is_empty() && !swept_over {
             return;
@@ -131,10 +132,12 @@ impl World {
                 if !self.bodies[body.index as usize].awake {
                     self.wake(body.index);
                 }
-                self.stop_at(body.index, &stop.at);
+                self.stop_at(body.index, &stop.way.last());
                 self.take_back(body.index, stop);
+                crate::storage::push(&mut self.flight.held, (body.index, stop.way));
             }
         }
+        self.flight.held.sort_unstable_by_key(|held| held.0);
         self.stops = stops;
     }
 
@@ -278,7 +281,8 @@ struct ImpactSearch<'a> {
 /// Where a body is held.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Held {
-    at: Pose,
+    /// How it has come there.
+    way: Way,
     /// From what holds it to the body.
     normal: Vec3,
     /// Share of the step in which it has not moved towards that.
@@ -321,12 +325,13 @@ impl ImpactSearch<'_> {
                 return Some(self.slide(body, &way, first.hit));
             }
             // What a contact has held for all of the step has gained nothing.
-            return Some(Held { at: way.at(time), normal, lost: if first.hit.touches { 0.0 } else { 1.0 - time } });
+            let lost = if first.hit.touches { 0.0 } else { 1.0 - time };
+            return Some(Held { way: way.stopped(time), normal, lost });
         };
         // What takes it along must not take it through a wall.
         let rest = Way::new(way.at(time), carried, turn * (1.0 - time));
         let at = self.first_stop(slots, &rest, &[]).map_or(carried, |stop| rest.at(stop.hit.time));
-        Some(Held { at, normal, lost: 0.0 })
+        Some(Held { way: Way::still(at), normal, lost: 0.0 })
     }
 
     /// Lets a body of many pieces go on along what holds it. It has had a contact with that for all of the step, so its
@@ -344,7 +349,7 @@ impl ImpactSearch<'_> {
             normals[at] = hit.normal;
             let along = free * along_all((way.end.position - way.start.position) * left, &normals[..=at]);
             if along.length() > MOST_SLIDE * self.settings.speculative_distance {
-                return Held { at: here, normal: hit.normal, lost: 0.0 };
+                return Held { way: Way::still(here), normal: hit.normal, lost: 0.0 };
             }
             // What is held at once is held by its turning, or by more than one obstacle.
             let turns = hit.time > LEAST_PROGRESS && at + 2 < MOST_SLIDES;
@@ -352,14 +357,14 @@ impl ImpactSearch<'_> {
                 if turns { (way.end.rotation, way.turn * left) } else { (here.rotation, Vec3::ZERO) };
             way = Way::new(here, Pose::new(here.position + along, rotation), turn);
             match self.first_stop(slots, &way, self.kinematic) {
-                None => return Held { at: way.end, normal: hit.normal, lost: 0.0 },
+                None => return Held { way: Way::still(way.end), normal: hit.normal, lost: 0.0 },
                 Some(stop) if stop.carried.is_some() || !stop.hit.touches => {
-                    return Held { at: way.at(stop.hit.time), normal: stop.hit.normal, lost: 0.0 };
+                    return Held { way: Way::still(way.at(stop.hit.time)), normal: stop.hit.normal, lost: 0.0 };
                 }
                 Some(stop) => hit = stop.hit,
             }
         }
-        Held { at: way.at(hit.time), normal: hit.normal, lost: 0.0 }
+        Held { way: Way::still(way.at(hit.time)), normal: hit.normal, lost: 0.0 }
     }
 
     /// The first impact of the shapes of a body on its way.
