@@ -38,7 +38,7 @@ use super::shapes::ShapeSlot;
 use crate::arbiter::NONE;
 use crate::broad_phase::{BroadPhase, TreeKind};
 use crate::math::{Aabb, Pose, Real, Vec3, min};
-use crate::narrow_phase::{Support, Sweep, Touch, first_touch, gap};
+use crate::narrow_phase::{Approach, Support, Sweep, Touch, approach, gap};
 use crate::parallel::SharedSlice;
 use crate::shape::{Cuboid, MeshSides, Shape, Surface};
 use crate::solver::SolverBodies;
@@ -581,30 +581,47 @@ impl ImpactSearch<'_> {
 
     /// First impact with a convex shape at the origin.
     fn impact(&self, fixed: &Support<'_>, mover: &Mover<'_>) -> Option<Hit> {
-        let (still, slop) = (Sweep::still(Pose::IDENTITY), self.settings.slop);
-        let touch = |shape: &Support<'_>, path: &Sweep| first_touch(fixed, &still, shape, path, slop);
-        if mover.whole && gap(fixed, &mover.support, &mover.path.start) > 0.0 {
-            return touch(&mover.support, &mover.path).map(Hit::from_afar);
-        }
-        // A violent step before can have pushed the core in: then its spine stays on this side, or at least its very middle.
-        if gap(fixed, &mover.core, &mover.core_path.start) <= 0.0 {
-            if let Some((spine, path)) = mover.spine()
-                && gap(fixed, &spine, &path.start) > 0.0
-            {
-                return touch(&spine, &path).map(Hit::of_contact);
+        if mover.whole {
+            match self.approach(fixed, (&mover.support, &mover.path)) {
+                Approach::Overlap => {}
+                Approach::Miss => return None,
+                Approach::Touch(touch) => return Some(Hit::from_afar(touch)),
             }
-            let (middle, path) = mover.middle();
-            let hit = touch(&middle, &path).map(Hit::of_contact)?;
-            let no_nearer = gap(fixed, &middle, &path.start) <= middle.radius();
-            return Some(if no_nearer { Hit { time: 0.0, ..hit } } else { hit }); // half the gap in each step is nothing in the end
         }
-        let core = touch(&mover.core, &mover.core_path)?;
+        let core = match self.approach(fixed, (&mover.core, &mover.core_path)) {
+            Approach::Overlap => return self.impact_inside(fixed, mover),
+            Approach::Miss => return None,
+            Approach::Touch(touch) => touch,
+        };
         if gap(fixed, &mover.support, &mover.path.start) <= self.settings.speculative_distance {
             return Some(Hit::of_contact(core));
         }
-        let surface = touch(&mover.support, &mover.path);
-        let first = surface.filter(|surface| surface.time < core.time).unwrap_or(core);
-        Some(Hit::from_afar(first))
+        match self.approach(fixed, (&mover.support, &mover.path)) {
+            Approach::Touch(surface) if surface.time < core.time => Some(Hit::from_afar(surface)),
+            _ => Some(Hit::from_afar(core)),
+        }
+    }
+
+    /// The impact of what is left of a shape when violent steps have pushed its core in: its spine stays on this side, or at
+    /// least its very middle.
+    fn impact_inside(&self, fixed: &Support<'_>, mover: &Mover<'_>) -> Option<Hit> {
+        if let Some((spine, path)) = mover.spine() {
+            match self.approach(fixed, (&spine, &path)) {
+                Approach::Overlap => {}
+                Approach::Miss => return None,
+                Approach::Touch(touch) => return Some(Hit::of_contact(touch)),
+            }
+        }
+        let (middle, path) = mover.middle();
+        let Approach::Touch(touch) = self.approach(fixed, (&middle, &path)) else { return None };
+        let no_nearer = gap(fixed, &middle, &path.start) <= middle.radius();
+        // Half the gap in each step is nothing in the end.
+        let time = if no_nearer { 0.0 } else { touch.time };
+        Some(Hit { time, ..Hit::of_contact(touch) })
+    }
+
+    fn approach(&self, fixed: &Support<'_>, (shape, path): (&Support<'_>, &Sweep)) -> Approach {
+        approach(fixed, &Sweep::still(Pose::IDENTITY), shape, path, self.settings.slop)
     }
 }
 
