@@ -297,7 +297,7 @@ fn a_bullet_breaks_a_stack() {
 /// A million metres a second and a spin to match, ordinary bodies and bullets: nothing panics, nothing leaves the box.
 #[test]
 fn absurd_speeds_do_no_harm() {
-    (83..91).for_each(fly_absurdly);
+    [83, 89, 97].into_iter().for_each(fly_absurdly);
 }
 
 fn fly_absurdly(seed: u64) {

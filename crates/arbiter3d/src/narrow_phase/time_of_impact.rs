@@ -126,13 +126,7 @@ pub(crate) enum Approach {
 /// Shapes that start apart but within `target` are stopped where half of that first gap is left, so that one that slides
 /// along another is not held. After [`MAX_ROUNDS`] rounds (fast spin close to a surface) the time reached is given
 /// back: nothing is ever missed, a stop may be early.
-pub(crate) fn approach(
-    shape1: &Support,
-    sweep1: &Sweep,
-    shape2: &Support,
-    sweep2: &Sweep,
-    target: Real,
-) -> Approach {
+pub(crate) fn approach(shape1: &Support, sweep1: &Sweep, shape2: &Support, sweep2: &Sweep, target: Real) -> Approach {
     let motion = Motion::new(sweep1, sweep2);
     let radii = shape1.radius() + shape2.radius();
     let (spin1, spin2) = (sweep1.swing_of(shape1), sweep2.swing_of(shape2));

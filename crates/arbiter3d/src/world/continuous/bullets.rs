@@ -312,13 +312,8 @@ impl World {
         }
         let here = track.at(time);
         track.impacts += 1;
-        let state = &self.solver_bodies.states[body as usize];
         let left = (1.0 - time) as Real * self.dt;
-        // The next step limits both, and a way is cut into so many parts only.
-        let (way, turn) = (
-            shortened(state.linear_velocity, self.scaled.max_linear_speed) * left,
-            shortened(state.angular_velocity, MOST_TURN * self.scaled.substeps as Real / self.dt) * left,
-        );
+        let [way, turn] = self.flight_velocities(body).map(|velocity| velocity * left);
         let steps = max((turn.length() * 4.0).ceil(), 1.0);
         let each = turn / steps;
         let rotation = (0..(steps as usize).min(256)).fold(here.rotation, |rotation, _| rotation.integrate(each));
@@ -338,6 +333,17 @@ impl World {
         }
         let aabb = self.box_of_way(body, &flight.tracks[at].way);
         flight.tree.move_leaf(flight.tracks[at].leaf, &aabb);
+    }
+
+    /// The velocities, linear and angular, with which a body goes on after an impact: no faster than the next step lets it, for a
+    /// way is cut into so many parts only. An impact is solved for these, since they are what has come together.
+    pub(super) fn flight_velocities(&self, body: u32) -> [Vec3; 2] {
+        let state = &self.solver_bodies.states[body as usize];
+        let fastest_turn = MOST_TURN * self.scaled.substeps as Real / self.dt;
+        [
+            shortened(state.linear_velocity, self.scaled.max_linear_speed),
+            shortened(state.angular_velocity, fastest_turn),
+        ]
     }
 
     /// Finds the next meetings of all bullets that two bodies on new ways concern; `before` are the boxes around their old

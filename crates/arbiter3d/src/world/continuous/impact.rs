@@ -12,7 +12,7 @@ use crate::arbiter::{ArbiterId, ArbiterKey, Contact, NONE, SolveMode};
 use crate::id::{BodyId, ShapeId};
 use crate::math::{Pose, Real, SymmetricMat3, Vec3, max, min};
 use crate::narrow_phase::{Manifold, PairCache, collide_on};
-use crate::solver::{BodyMass, BodyState};
+use crate::solver::BodyMass;
 use crate::world::World;
 use crate::world::bodies::world_inverse_inertia;
 
@@ -294,7 +294,7 @@ impl World {
         let data = &arbiter.data;
         let bodies = [arbiter.body1.index, arbiter.body2.index];
         let masses: [&BodyMass; 2] = bodies.map(|body| &self.solver_bodies.masses[body as usize]);
-        let states: [&BodyState; 2] = bodies.map(|body| &self.solver_bodies.states[body as usize]);
+        let velocities = bodies.map(|body| self.flight_velocities(body));
         let linear_mode = [SolveMode::LINEAR_BODY1, SolveMode::LINEAR_BODY2];
         let angular_mode = [SolveMode::ANGULAR_BODY1, SolveMode::ANGULAR_BODY2];
         let sides = [0, 1];
@@ -308,8 +308,8 @@ impl World {
                 let turns = data.solve_mode.contains(angular_mode[side]);
                 if turns { masses[side].inverse_inertia } else { SymmetricMat3::ZERO }
             }),
-            linear: states.map(|state| state.linear_velocity),
-            angular: states.map(|state| state.angular_velocity),
+            linear: velocities.map(|[linear, _]| linear),
+            angular: velocities.map(|[_, angular]| angular),
             points: [Point::default(); CONTACTS],
             count: 0,
         }
@@ -358,8 +358,11 @@ impl World {
         crate::storage::push(&mut self.impacts, noted);
         for (side, body) in bodies.into_iter().enumerate() {
             if self.bodies[body.index as usize].is_dynamic() {
+                // What is faster than the way leads stays beside it, and none of it is lost here.
+                let [linear, angular] = self.flight_velocities(body.index);
                 let state = &mut self.solver_bodies.states[body.index as usize];
-                (state.linear_velocity, state.angular_velocity) = (solve.linear[side], solve.angular[side]);
+                state.linear_velocity = solve.linear[side] + (state.linear_velocity - linear);
+                state.angular_velocity = solve.angular[side] + (state.angular_velocity - angular);
             }
         }
     }
