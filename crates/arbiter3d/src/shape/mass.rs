@@ -209,7 +209,7 @@ mod tests {
             let far = 1.5 * size.y as Real;
             let cast = |from: Real, way: Real| {
                 let origin = Vec3::new(x as Real, from, z as Real);
-                let ray = crate::query::Ray { origin, direction: Vec3::Y * way, max_fraction: 1.0 };
+                let ray = crate::shape::Ray { origin, direction: Vec3::Y * way, max_fraction: 1.0 };
                 shape.geometry().cast_ray(&ray).map(|hit| f64::from(from + way * hit.fraction))
             };
             let (Some(top), Some(bottom)) =

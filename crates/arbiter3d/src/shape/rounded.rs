@@ -1,11 +1,12 @@
 //! Convex shapes grown by a radius: rounded boxes, hulls, cylinders.
 
 use super::convex::{Feature, mass_of_support};
+use super::convex_ray::cast_support;
 use super::geometry::Geometry;
+use super::ray::{Ray, ShapeHit};
 use super::{MassProperties, Shape, ShapeError, positive};
 use crate::math::{Aabb, Pose, Real, SymmetricMat3, Vec3};
 use crate::narrow_phase::Support;
-use crate::query::{Ray, ShapeHit, cast_support};
 use glam::DVec3;
 
 /// A convex shape grown by a radius on all sides.

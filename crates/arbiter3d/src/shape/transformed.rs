@@ -7,10 +7,10 @@ use super::convex::Feature;
 use super::geometry::Geometry;
 use super::inside::Inside;
 use super::mass::Moments;
+use super::ray::{Ray, ShapeHit, cast_ray};
 use super::{MassProperties, Shape, ShapeError};
 use crate::math::{Aabb, Mat3, Pose, Real, Vec3, max, max3, min3};
 use crate::narrow_phase::{Ellipsoid, Support};
-use crate::query::{Ray, ShapeHit, cast_ray};
 use glam::{DMat3, DVec3};
 use std::sync::OnceLock;
 

@@ -30,11 +30,11 @@ mod tests;
 use super::geometry::Geometry;
 use super::mesh::{Facet, MeshRayHit, MeshSides, unit_normal};
 use super::mesh_tree::LEAF;
+use super::ray::{Ray, ShapeHit};
 use super::surface::Surface;
 use super::surface_ray::first_triangle;
 use super::{MassProperties, ShapeError, positive};
 use crate::math::{Aabb, Real, Vec3};
-use crate::query::{Ray, ShapeHit};
 use crate::simd::{LaneVec3, Lanes};
 use blocks::Level;
 

@@ -16,7 +16,7 @@ use crate::edge_lists::EdgeLists;
 use crate::math::{Pose, Real, Vec3};
 use crate::narrow_phase::{Patch, SeamCast as Cast, Verdict, scale_of};
 use crate::parallel::{SharedSlice, StagePool};
-use crate::query::{Ray, ShapeHit, cast_placed};
+use crate::shape::{Ray, ShapeHit, cast_placed};
 use crate::solver::SolverBodies;
 use crate::storage::FixedList;
 
