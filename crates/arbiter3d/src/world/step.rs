@@ -14,7 +14,7 @@ use crate::math::{Aabb, Pose, Real, Vec3, min};
 use crate::parallel::{BlockList, Gather, SharedSlice};
 use crate::solver::{
     BodyMass, BodyMotion, BodyState, IntegrateParameters, IntegrateTarget, Integration, Pass, PassParameters,
-    PrepareContext, RowPart, Softness, StoreTarget,
+    PrepareContext, RowPart, Softness, SquareScale, StoreTarget,
 };
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -319,6 +319,7 @@ impl World {
             deepest_rest: if settings.slop > 0.0 { DEEPEST_REST * settings.slop } else { 1e6 },
             softness,
             restitution_threshold: settings.restitution_threshold,
+            squares: SquareScale::new(settings.length_unit),
         };
         // Against the ground twice as stiff: what stands on it has the weight of all above.
         let soft = pass(Softness::new(hertz, settings.contact_damping_ratio, substep));
