@@ -16,9 +16,7 @@
 mod capsule;
 mod clip;
 mod composite;
-mod cores;
 mod cuboid;
-mod distance;
 mod general;
 mod half_space;
 mod hull;
@@ -27,11 +25,9 @@ mod mesh;
 mod mesh_points;
 mod nearest;
 mod penetration;
-mod polyhedron;
 mod revolved;
 mod seam;
 mod sphere;
-mod support;
 mod surfaces;
 mod time_of_impact;
 mod triangle;
@@ -39,11 +35,10 @@ mod triangle_general;
 mod triangle_lanes;
 mod triangle_solid;
 
-pub(crate) use cores::Ellipsoid;
+pub(crate) use crate::shape::Support;
+pub(crate) use crate::shape::distance::{Cast, CastPoint, closest, linear_cast};
 pub(crate) use cuboid::{CuboidLanes, CuboidPair, Near as NearCuboids, WideManifold};
-pub(crate) use distance::{Cast, CastPoint, closest, linear_cast};
 pub(crate) use seam::{Cast as SeamCast, Patch, Verdict, scale_of};
-pub(crate) use support::Support;
 pub(crate) use time_of_impact::{Sweep, Touch, first_touch, gap, time_of_impact};
 
 pub use manifold::{Manifold, ManifoldPoint};

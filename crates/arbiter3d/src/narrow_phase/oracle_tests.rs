@@ -195,7 +195,7 @@ fn polyhedron(shape: &Shape) -> Option<Solid> {
 /// What the old kernels' preference is relative to.
 fn preference(shape: &Shape) -> Real {
     let extents = shape.local_aabb().half_extents();
-    super::polyhedron::tolerance_size(shape.inner_radius(), extents.max_element())
+    crate::shape::polyhedron::tolerance_size(shape.inner_radius(), extents.max_element())
 }
 
 /// A pose with about a given gap along a random direction; a third of them square to each other.

@@ -3,11 +3,12 @@
 //! A cylinder is the part of an endless one between two planes, a cone the part of an endless one over a plane: the line is
 //! inside for an interval of each, and enters the shape where the last of them begins. The quadratics are solved in `f64`.
 //!
-//! Any other convex shape is met by a point that is cast at it (`narrow_phase::linear_cast`).
+//! Any other convex shape is met by a point that is cast at it (`distance::linear_cast`).
 
+use super::distance::{Cast, linear_cast};
+use super::support::Support;
 use super::{Cone, Cylinder, Ray, ShapeHit};
 use crate::math::{Pose, Real, Vec3};
-use crate::narrow_phase::{Cast, Support, linear_cast};
 use glam::DVec3;
 
 /// Where a line is inside something, and the outward normal where it enters.
@@ -140,7 +141,8 @@ pub(super) fn cast_support(support: &Support<'_>, ray: &Ray) -> Option<ShapeHit>
 mod tests {
     use super::*;
     use crate::math::{Mat3, tangents};
-    use crate::narrow_phase::{Random, closest};
+    use crate::narrow_phase::Random;
+    use crate::shape::distance::closest;
     use crate::shape::{Shape, Sphere};
 
     fn shapes(size: Real) -> Vec<Shape> {

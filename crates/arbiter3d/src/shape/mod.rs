@@ -14,11 +14,13 @@ mod compound;
 mod cone;
 mod convex;
 mod convex_ray;
+pub(crate) mod cores;
 mod cuboid;
 mod custom;
 mod cylinder;
 #[cfg(feature = "decomposition")]
 mod decomposition;
+pub(crate) mod distance;
 mod geometry;
 mod half_space;
 mod height_field;
@@ -36,9 +38,11 @@ mod mesh_interior;
 mod mesh_tree;
 mod mesh_tree_builder;
 mod point_cloud;
+pub(crate) mod polyhedron;
 mod ray;
 mod rounded;
 mod sphere;
+mod support;
 mod surface;
 mod surface_ray;
 mod tapered_capsule;
@@ -75,6 +79,7 @@ pub(crate) use ray::cast_placed;
 pub use ray::{Ray, ShapeHit, cast_ray};
 pub use rounded::Rounded;
 pub use sphere::Sphere;
+pub(crate) use support::Support;
 pub(crate) use surface::Surface;
 pub use tapered_capsule::TaperedCapsule;
 pub use transformed::Transformed;
@@ -83,7 +88,6 @@ pub(crate) use triangle::{triangle_edge, triangle_feature};
 pub use voxels::VoxelGrid;
 
 use crate::math::{Aabb, Mat3, Pose, Real, Vec3};
-use crate::narrow_phase::Support;
 use std::sync::Arc;
 
 /// Why a shape cannot be built. Each message names the argument or the element.

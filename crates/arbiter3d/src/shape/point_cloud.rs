@@ -10,9 +10,9 @@ use super::convex_ray::cast_support;
 use super::geometry::Geometry;
 use super::inside::Inside;
 use super::ray::{Ray, ShapeHit};
+use super::support::Support;
 use super::{ConvexHull, MassProperties, ShapeError};
 use crate::math::{Aabb, Pose, Real, Vec3, max, tangents};
-use crate::narrow_phase::Support;
 use glam::DVec3;
 
 /// The shrink-wrap of points: everything between them.

@@ -4,9 +4,9 @@ use super::convex::{Feature, mass_of_support};
 use super::convex_ray::cast_support;
 use super::geometry::Geometry;
 use super::ray::{Ray, ShapeHit};
+use super::support::Support;
 use super::{MassProperties, Shape, ShapeError, positive};
 use crate::math::{Aabb, Pose, Real, SymmetricMat3, Vec3};
-use crate::narrow_phase::Support;
 use glam::DVec3;
 
 /// A convex shape grown by a radius on all sides.

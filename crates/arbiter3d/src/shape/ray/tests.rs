@@ -1,8 +1,8 @@
 //! Rays against closed formulas, and against marching along the exact distance of the shape.
 
 use super::super::convex_ray::cast_support;
+use super::super::support::Support;
 use super::*;
-use crate::narrow_phase::Support;
 
 fn ray(origin: [Real; 3], direction: [Real; 3], max_fraction: Real) -> Ray {
     Ray { origin: origin.into(), direction: direction.into(), max_fraction }
