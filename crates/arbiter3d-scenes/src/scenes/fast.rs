@@ -229,8 +229,8 @@ mod tests {
         nobody_escapes("high_speed_bullets", 5000, 3600);
     }
 
-    /// Of a hundred bodies that bounce between walls of a centimetre for seven seconds, spinning at up to 400 rad/s, at most one in
-    /// twenty gets its centre of mass through: a violent contact can push a spike or a thin handle in.
+    /// Of a hundred bodies that bounce between walls of a centimetre for seven seconds, spinning at up to 400 rad/s, at
+    /// most one in twenty gets its centre of mass through: a violent contact can push a spike or a thin handle in.
     #[test]
     fn bodies_of_all_kinds_stay_in_their_room() {
         let mut outside = std::collections::BTreeSet::new();
