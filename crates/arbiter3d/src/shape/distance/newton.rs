@@ -93,6 +93,10 @@ fn turn([k11, k12, k22]: [f64; 3], height: f64, [s1, s2]: [f64; 2]) -> Option<[f
 }
 
 /// Two unit vectors square to a unit vector and to each other.
+///
+/// [`crate::math::tangents`] does the same in single precision, branch-free for the solver's lanes. Any pair serves here, but
+/// that formula in `f64` would give other last bits to contacts of round shapes, and save nothing: what counts is the support
+/// map that is asked between two calls.
 pub(crate) fn tangents(normal: DVec3) -> [DVec3; 2] {
     let axis = if normal.x.abs() > 0.6 { DVec3::Y } else { DVec3::X };
     let first = normal.cross(axis).normalize();
