@@ -173,8 +173,8 @@ fn made_shape(at: usize, unit: f32) -> Shape {
 }
 
 /// Heaps of one kind and of all kinds mixed, some of them thrown together so that they overlap, are the same bits for a second at
-/// a millimetre, a metre and a kilometre. The friction of a millimetre's ball is an impulse of 10⁻¹⁶ N s and less: its square does
-/// not fit single precision.
+/// a millimetre, a metre and a kilometre. The friction of a millimetre's ball is an impulse of 10⁻¹⁶ N s and less: its
+/// square does not fit single precision.
 #[test]
 fn mixed_heaps_scaled_by_powers_of_two_are_the_same_bits() {
     let shape = |kind: usize, unit: f32| if kind < 9 { shape(kind, unit) } else { made_shape(kind, unit) };

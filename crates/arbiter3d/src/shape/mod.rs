@@ -614,8 +614,8 @@ impl Shape {
 
     /// Corners and triangles of the surface, for drawing and exporting; the triangles wind counter-clockwise from outside.
     ///
-    /// Cuboids, hulls, meshes and height fields as they are; other convex shapes through about `4 steps²` points of their surface, at least
-    /// one step, at most 64. A half-space gives a square of 200 m.
+    /// Cuboids, hulls, meshes and height fields as they are; other convex shapes through about `4 steps²` points of
+    /// their surface, at least one step, at most 64. A half-space gives a square of 200 m.
     ///
     /// ```
     /// use arbiter3d::Shape;
