@@ -37,6 +37,8 @@ pub mod narrow_phase;
 mod parallel;
 mod place_table;
 mod query;
+#[cfg(test)]
+mod random;
 mod shape;
 mod simd;
 mod solver;

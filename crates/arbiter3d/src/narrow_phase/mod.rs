@@ -1,8 +1,8 @@
 //! Contacts between two shapes: which points touch, along which normal, how deep.
 //!
 //! [`collide`] sorts a pair by the kind of its shapes, so that each kernel is written once, with the more complex
-//! shape in the role of shape 1: compound, voxels, mesh, hull, cuboid, capsule, sphere. Where the caller's order is the other one, the
-//! result is mirrored.
+//! shape in the role of shape 1: compound, voxels, mesh, hull, cuboid, capsule, sphere. Where the caller's order is the
+//! other one, the result is mirrored.
 //!
 //! Every kernel keeps these laws:
 //! - all is in the frame of shape 1, so only the relative pose counts and a pair far from the origin loses no
@@ -185,5 +185,3 @@ mod nearest_tests;
 mod oracle_tests;
 #[cfg(test)]
 mod tests;
-#[cfg(test)]
-pub(crate) use tests::Random;

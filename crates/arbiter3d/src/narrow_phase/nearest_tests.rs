@@ -1,8 +1,8 @@
 //! The closed forms against the searches, and shapes on which formulas break.
 
 use super::nearest::nearest;
-use super::tests::Random;
 use crate::math::{Pose, Real, Rotation, Vec3};
+use crate::random::Random;
 use crate::shape::Shape;
 use crate::shape::Support;
 use crate::shape::distance::{Nearness, Placed};

@@ -5,9 +5,9 @@
 //! axes give a bound from below; the gap along the kernel's own normal, which no direction can beat by definition unless the
 //! kernel is wrong, gives one from above.
 
-use super::tests::Random;
 use super::*;
 use crate::math::{Mat3, Vec3, max, min, tangents};
+use crate::random::Random;
 use crate::shape::{ConvexHull, ConvexShape};
 use glam::{DMat3, DVec3};
 use std::sync::atomic::{AtomicUsize, Ordering};

@@ -521,7 +521,7 @@ impl Outline {
 mod tests {
     use super::*;
     use crate::math::{Pose, Rotation, Vec3};
-    use crate::narrow_phase::tests::Random;
+    use crate::random::Random;
     use crate::shape::Support;
     use crate::shape::distance::Nearness;
     use crate::shape::{Cuboid, Cylinder, Shape};

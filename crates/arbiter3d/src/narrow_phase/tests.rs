@@ -2,43 +2,10 @@
 
 use super::*;
 use crate::math::{Rotation, Vec3};
+use crate::random::Random;
 use crate::shape::ConvexHull;
 use crate::shape::polyhedron::cuboid_size;
 use glam::{DMat3, DVec3};
-
-/// Numbers that repeat from run to run (Marsaglia's xorshift, 2003).
-pub(crate) struct Random(pub u64);
-
-impl Random {
-    pub fn unit(&mut self) -> Real {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 >> 40) as Real / (1u64 << 24) as Real
-    }
-
-    pub fn between(&mut self, low: Real, high: Real) -> Real {
-        low + (high - low) * self.unit()
-    }
-
-    pub fn vector(&mut self) -> Vec3 {
-        Vec3::new(self.between(-1.0, 1.0), self.between(-1.0, 1.0), self.between(-1.0, 1.0))
-    }
-
-    pub fn direction(&mut self) -> Vec3 {
-        loop {
-            let v = self.vector();
-            if v.length_squared() > 0.01 && v.length_squared() < 1.0 {
-                return v.normalize();
-            }
-        }
-    }
-
-    pub fn rotation(&mut self) -> Rotation {
-        let (v, w) = (self.vector(), self.between(-1.0, 1.0));
-        Rotation::from_xyzw(v.x, v.y, v.z, w).normalize()
-    }
-}
 
 pub(super) fn contacts(a: &Shape, b: &Shape, pose: &Pose, margin: Real) -> Manifold {
     let mut manifold = Manifold::EMPTY;

@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::math::{Aabb, Pose, Rotation};
-use crate::narrow_phase::tests::Random;
 use crate::narrow_phase::triangle_lanes::Near;
+use crate::random::Random;
 use crate::shape::polyhedron::CuboidFeatures;
 use crate::shape::{ConvexHull, Cuboid, Leaves, TriangleMesh};
 use crate::simd::{LaneVec3, Lanes, Wide};

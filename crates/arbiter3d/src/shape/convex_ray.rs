@@ -141,7 +141,7 @@ pub(super) fn cast_support(support: &Support<'_>, ray: &Ray) -> Option<ShapeHit>
 mod tests {
     use super::*;
     use crate::math::{Mat3, tangents};
-    use crate::narrow_phase::Random;
+    use crate::random::Random;
     use crate::shape::distance::closest;
     use crate::shape::{Shape, Sphere};
 

@@ -476,7 +476,7 @@ mod tests {
     use super::super::{Capsule, Cuboid, Sphere};
     use super::*;
     use crate::math::Rotation;
-    use crate::narrow_phase::Random;
+    use crate::random::Random;
 
     fn gap(a: &Support, b: &Support, pose: &Pose) -> Option<Closest> {
         let found = closest(a, b, pose);

@@ -1,9 +1,10 @@
 //! Hulls of all proportions against separating axes in `f64`, and what must not change a bit.
 
-use super::super::tests::{Random, contacts, hull_oracle};
+use super::super::tests::{contacts, hull_oracle};
 use super::super::{collide, collide_on};
 use super::*;
 use crate::math::Rotation;
+use crate::random::Random;
 use crate::shape::Shape;
 use crate::shape::distance::closest;
 

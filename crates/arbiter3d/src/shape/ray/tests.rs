@@ -3,6 +3,7 @@
 use super::super::convex_ray::cast_support;
 use super::super::support::Support;
 use super::*;
+use crate::random::Random;
 
 fn ray(origin: [Real; 3], direction: [Real; 3], max_fraction: Real) -> Ray {
     Ray { origin: origin.into(), direction: direction.into(), max_fraction }
@@ -154,18 +155,6 @@ fn march(shape: &Shape, ray: &Ray) -> Option<f64> {
         fraction += gap / length;
     }
     None
-}
-
-struct Random(u64);
-
-impl Random {
-    fn vector(&mut self) -> Vec3 {
-        let mut signed = || {
-            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            ((self.0 >> 40) as f64 / f64::from(1 << 23) - 1.0) as Real
-        };
-        Vec3::new(signed(), signed(), signed())
-    }
 }
 
 /// 10,000 random rays a shape: same answer as marching, a point on the surface, and the normal is the distance's gradient.
