@@ -39,7 +39,7 @@ pub(crate) use crate::shape::Support;
 pub(crate) use crate::shape::distance::{Cast, CastPoint, closest, linear_cast};
 pub(crate) use cuboid::{CuboidLanes, CuboidPair, Near as NearCuboids, WideManifold};
 pub(crate) use seam::{Cast as SeamCast, Patch, Verdict, scale_of};
-pub(crate) use time_of_impact::{Sweep, Touch, first_touch, gap, time_of_impact};
+pub(crate) use time_of_impact::{Approach, Sweep, Touch, approach, gap, time_of_impact};
 
 pub use manifold::{Manifold, ManifoldPoint};
 

@@ -110,20 +110,23 @@ pub(crate) struct Touch {
     pub normal: Vec3,
 }
 
+/// How two moving shapes come near each other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Approach {
+    /// They overlap at the start: they have a touching contact, which is for the solver to part.
+    Overlap,
+    /// They never come as near as asked.
+    Miss,
+    Touch(Touch),
+}
+
 /// The first time in `[0, 1]` at which the gap of two moving shapes falls to `target` (metres, about a tenth more
-/// counts), or `None` if it never does.
+/// counts), if it ever does.
 ///
-/// Shapes that overlap at the start give `None`: they have a touching contact, which is for the solver to part. Shapes
-/// that start apart but within `target` are stopped where half of that first gap is left, so that one that slides
+/// Shapes that start apart but within `target` are stopped where half of that first gap is left, so that one that slides
 /// along another is not held. After [`MAX_ROUNDS`] rounds (fast spin close to a surface) the time reached is given
 /// back: nothing is ever missed, a stop may be early.
-pub(crate) fn first_touch(
-    shape1: &Support,
-    sweep1: &Sweep,
-    shape2: &Support,
-    sweep2: &Sweep,
-    target: Real,
-) -> Option<Touch> {
+pub(crate) fn approach(shape1: &Support, sweep1: &Sweep, shape2: &Support, sweep2: &Sweep, target: Real) -> Approach {
     let motion = Motion::new(sweep1, sweep2);
     let radii = shape1.radius() + shape2.radius();
     let (spin1, spin2) = (sweep1.swing_of(shape1), sweep2.swing_of(shape2));
@@ -137,33 +140,33 @@ pub(crate) fn first_touch(
         let gap = found.map_or(-1.0, |c| c.distance - radii);
         let Some(found) = found.filter(|_| gap > 0.0) else {
             // Past the start this is rounding: the gap was there a moment ago.
-            return if round == 0 { None } else { Some(touch) };
+            return if round == 0 { Approach::Overlap } else { Approach::Touch(touch) };
         };
         let normal = pose1.rotation.rotate(found.normal);
         touch.normal = normal;
         if round == 0 {
             target = min(0.5 * gap, target);
         } else if gap <= target + max(TOLERANCE * target, rounding) {
-            return Some(touch);
+            return Approach::Touch(touch);
         }
         let closing = -(motion.displacement.dot(normal.as_dvec3())) as Real;
         let speed = closing + spin1.cross(normal).length() + spin2.cross(normal).length();
         if speed <= 0.0 {
-            return None;
+            return Approach::Miss;
         }
         let next = t + (gap - target) / speed;
         if next >= 1.0 {
-            return None;
+            return Approach::Miss;
         }
         if next <= t {
-            return Some(touch);
+            return Approach::Touch(touch);
         }
         touch.time = next;
     }
-    Some(touch)
+    Approach::Touch(touch)
 }
 
-/// The time of [`first_touch`].
+/// The time of the touch that [`approach`] finds.
 pub(crate) fn time_of_impact(
     shape1: &Support,
     sweep1: &Sweep,
@@ -171,7 +174,10 @@ pub(crate) fn time_of_impact(
     sweep2: &Sweep,
     target: Real,
 ) -> Option<Real> {
-    first_touch(shape1, sweep1, shape2, sweep2, target).map(|touch| touch.time)
+    match approach(shape1, sweep1, shape2, sweep2, target) {
+        Approach::Touch(touch) => Some(touch.time),
+        Approach::Overlap | Approach::Miss => None,
+    }
 }
 
 /// Gap of two shapes, `pose` placing shape 2 in the frame of shape 1; zero or less where they overlap.

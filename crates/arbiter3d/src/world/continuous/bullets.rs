@@ -68,16 +68,20 @@ impl Track {
     /// Where it is at a time of the step.
     pub fn at(&self, time: f64) -> Pose {
         let left = 1.0 - self.time;
-        if left > 0.0 { self.way.at(((time - self.time) / left) as Real) } else { self.way.end }
+        if left > 0.0 { self.way.at(((time - self.time) / left) as Real) } else { self.way.last() }
     }
 
-    /// Its way from a time of the step on.
-    fn rest(&self, time: f64) -> Way {
-        let left = 1.0 - self.time;
-        if time <= self.time || left <= 0.0 {
-            return self.way;
+    /// What is left of a part of its way from a time of the step on: when it begins and ends, and where.
+    fn part(&self, part: usize, from: f64) -> Option<([f64; 2], [Pose; 2])> {
+        let [begin, end] = [part, part + 1].map(|node| {
+            let share = node as f64 / self.way.parts as f64;
+            self.time + (1.0 - self.time) * share
+        });
+        let [start, last] = self.way.part(part);
+        if begin >= from {
+            return Some(([begin, end], [start, last]));
         }
-        Way::new(self.at(time), self.way.end, self.way.turn * ((1.0 - time) / left) as Real)
+        (end > from).then(|| ([from, end], [self.at(from), last]))
     }
 }
 
@@ -135,6 +139,8 @@ pub(crate) struct FlightScratch {
     places: Vec<u32>,
     /// The boxes around all ways.
     tree: DynamicTree,
+    /// The ways of the other bodies that have been stopped, by body.
+    pub(super) held: Vec<(u32, Way)>,
     due: BinaryHeap<Due>,
     searches: Vec<Search>,
     /// Arbiters that impacts have made or met.
@@ -163,11 +169,14 @@ impl World {
     fn start_tracks(&self, flight: &mut FlightScratch, bullets: &[FastBody], movers: &[FastBody]) {
         flight.places.resize(self.bodies.len(), NONE);
         for (at, fast) in bullets.iter().chain(movers).enumerate() {
-            let (end, turn) = (
-                self.solver_bodies.masses[fast.index as usize].pose(),
-                self.solver_bodies.states[fast.index as usize].turn,
-            );
-            self.add_track(flight, fast.index, Way::new(fast.start, end, turn));
+            let way = match flight.held.binary_search_by_key(&fast.index, |held| held.0) {
+                Ok(held) => flight.held[held].1,
+                Err(_) => {
+                    let (mass, state) = (&self.solver_bodies.masses, &self.solver_bodies.states);
+                    Way::new(fast.start, mass[fast.index as usize].pose(), state[fast.index as usize].turn)
+                }
+            };
+            self.add_track(flight, fast.index, way);
             flight.tracks[at].bullet = at < bullets.len();
         }
     }
@@ -195,7 +204,7 @@ impl World {
     /// The box around all of a body's way.
     fn box_of_way(&self, body: u32, way: &Way) -> Aabb {
         let reach = self.bodies[body as usize].reach + self.scaled.speculative_distance;
-        Aabb::from_points([way.start.position, way.end.position]).expand(reach)
+        Aabb::from_points([way.start.position, way.last().position]).expand(reach)
     }
 
     /// The first meeting of each bullet.
@@ -324,8 +333,7 @@ impl World {
             let search = self.impact_search();
             let slots = &self.bodies[body as usize].shape_slots;
             if let Some(stop) = search.first_stop(slots, &way, search.kinematic) {
-                let end = stop.carried.unwrap_or_else(|| way.at(stop.hit.time));
-                flight.tracks[at].way = Way::new(here, end, turn * stop.hit.time);
+                flight.tracks[at].way = stop.carried.map_or(way.stopped(stop.hit.time), Way::still);
             }
         }
         let aabb = self.box_of_way(body, &flight.tracks[at].way);
@@ -362,8 +370,9 @@ impl World {
             flight.tree.remove(track.leaf);
             flight.places[track.body as usize] = NONE;
             if track.met && self.bodies[track.body as usize].alive {
-                self.place_center(track.body, &track.way.end);
-                self.stop_at(track.body, &track.way.end);
+                let last = track.way.last();
+                self.place_center(track.body, &last);
+                self.stop_at(track.body, &last);
             }
         }
         for id in flight.arbiters.drain(..) {
@@ -421,7 +430,6 @@ impl FlightSearch<'_> {
         if from >= 1.0 || !track.bullet {
             return None;
         }
-        let way = track.rest(from);
         let mut first: Option<Meeting> = None;
         for &slot in &body.shape_slots {
             let shape = &self.impacts.shapes[slot as usize];
@@ -429,14 +437,12 @@ impl FlightSearch<'_> {
                 continue;
             }
             each_piece(shape, &mut |piece| {
-                for part in 0..way.parts {
-                    let [begin, end] =
-                        [part, part + 1].map(|node| from + (1.0 - from) * (node as f64 / way.parts as f64));
-                    if first.is_some_and(|meeting| meeting.time <= begin) {
+                for (times, ends) in (0..track.way.parts).filter_map(|part| track.part(part, from)) {
+                    if first.is_some_and(|meeting| meeting.time <= times[0]) {
                         break;
                     }
-                    let mover = Mover::new((shape, slot), piece, &way.part(part), true);
-                    self.meet_in_part((track, &mover), [begin, end], &mut first);
+                    let mover = Mover::new((shape, slot), piece, &ends, true);
+                    self.meet_in_part((track, &mover), times, &mut first);
                 }
             });
         }

@@ -38,7 +38,7 @@ use super::shapes::ShapeSlot;
 use crate::arbiter::NONE;
 use crate::broad_phase::{BroadPhase, TreeKind};
 use crate::math::{Aabb, Pose, Real, Vec3, min};
-use crate::narrow_phase::{Support, Sweep, Touch, first_touch, gap};
+use crate::narrow_phase::{Approach, Support, Sweep, Touch, approach, gap};
 use crate::parallel::SharedSlice;
 use crate::shape::{Cuboid, MeshSides, Shape, Surface};
 use crate::solver::SolverBodies;
@@ -98,6 +98,7 @@ impl World {
     /// Stops fast bodies at the first static or kinematic shapes on their ways, and has fast kinematic bodies take along what
     /// they would sweep over.
     pub(crate) fn stop_at_impacts(&mut self, fast: &mut Vec<FastBody>) {
+        self.flight.held.clear();
         let swept_over = self.kinematic_sweeps();
         if fast.is_empty() && !swept_over {
             return;
@@ -131,10 +132,12 @@ impl World {
                 if !self.bodies[body.index as usize].awake {
                     self.wake(body.index);
                 }
-                self.stop_at(body.index, &stop.at);
+                self.stop_at(body.index, &stop.way.last());
                 self.take_back(body.index, stop);
+                crate::storage::push(&mut self.flight.held, (body.index, stop.way));
             }
         }
+        self.flight.held.sort_unstable_by_key(|held| held.0);
         self.stops = stops;
     }
 
@@ -281,7 +284,8 @@ struct ImpactSearch<'a> {
 /// Where a body is held.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Held {
-    at: Pose,
+    /// How it has come there.
+    way: Way,
     /// From what holds it to the body.
     normal: Vec3,
     /// Share of the step in which it has not moved towards that.
@@ -324,12 +328,13 @@ impl ImpactSearch<'_> {
                 return Some(self.slide(body, &way, first.hit));
             }
             // What a contact has held for all of the step has gained nothing.
-            return Some(Held { at: way.at(time), normal, lost: if first.hit.touches { 0.0 } else { 1.0 - time } });
+            let lost = if first.hit.touches { 0.0 } else { 1.0 - time };
+            return Some(Held { way: way.stopped(time), normal, lost });
         };
         // What takes it along must not take it through a wall.
         let rest = Way::new(way.at(time), carried, turn * (1.0 - time));
         let at = self.first_stop(slots, &rest, &[]).map_or(carried, |stop| rest.at(stop.hit.time));
-        Some(Held { at, normal, lost: 0.0 })
+        Some(Held { way: Way::still(at), normal, lost: 0.0 })
     }
 
     /// Lets a body of many pieces go on along what holds it. It has had a contact with that for all of the step, so its
@@ -347,7 +352,7 @@ impl ImpactSearch<'_> {
             normals[at] = hit.normal;
             let along = free * along_all((way.end.position - way.start.position) * left, &normals[..=at]);
             if along.length() > MOST_SLIDE * self.settings.speculative_distance {
-                return Held { at: here, normal: hit.normal, lost: 0.0 };
+                return Held { way: Way::still(here), normal: hit.normal, lost: 0.0 };
             }
             // What is held at once is held by its turning, or by more than one obstacle.
             let turns = hit.time > LEAST_PROGRESS && at + 2 < MOST_SLIDES;
@@ -355,14 +360,14 @@ impl ImpactSearch<'_> {
                 if turns { (way.end.rotation, way.turn * left) } else { (here.rotation, Vec3::ZERO) };
             way = Way::new(here, Pose::new(here.position + along, rotation), turn);
             match self.first_stop(slots, &way, self.kinematic) {
-                None => return Held { at: way.end, normal: hit.normal, lost: 0.0 },
+                None => return Held { way: Way::still(way.end), normal: hit.normal, lost: 0.0 },
                 Some(stop) if stop.carried.is_some() || !stop.hit.touches => {
-                    return Held { at: way.at(stop.hit.time), normal: stop.hit.normal, lost: 0.0 };
+                    return Held { way: Way::still(way.at(stop.hit.time)), normal: stop.hit.normal, lost: 0.0 };
                 }
                 Some(stop) => hit = stop.hit,
             }
         }
-        Held { at: way.at(hit.time), normal: hit.normal, lost: 0.0 }
+        Held { way: Way::still(way.at(hit.time)), normal: hit.normal, lost: 0.0 }
     }
 
     /// The first impact of the shapes of a body on its way.
@@ -579,30 +584,47 @@ impl ImpactSearch<'_> {
 
     /// First impact with a convex shape at the origin.
     fn impact(&self, fixed: &Support<'_>, mover: &Mover<'_>) -> Option<Hit> {
-        let (still, slop) = (Sweep::still(Pose::IDENTITY), self.settings.slop);
-        let touch = |shape: &Support<'_>, path: &Sweep| first_touch(fixed, &still, shape, path, slop);
-        if mover.whole && gap(fixed, &mover.support, &mover.path.start) > 0.0 {
-            return touch(&mover.support, &mover.path).map(Hit::from_afar);
-        }
-        // A violent step before can have pushed the core in: then its spine stays on this side, or at least its very middle.
-        if gap(fixed, &mover.core, &mover.core_path.start) <= 0.0 {
-            if let Some((spine, path)) = mover.spine()
-                && gap(fixed, &spine, &path.start) > 0.0
-            {
-                return touch(&spine, &path).map(Hit::of_contact);
+        if mover.whole {
+            match self.approach(fixed, (&mover.support, &mover.path)) {
+                Approach::Overlap => {}
+                Approach::Miss => return None,
+                Approach::Touch(touch) => return Some(Hit::from_afar(touch)),
             }
-            let (middle, path) = mover.middle();
-            let hit = touch(&middle, &path).map(Hit::of_contact)?;
-            let no_nearer = gap(fixed, &middle, &path.start) <= middle.radius();
-            return Some(if no_nearer { Hit { time: 0.0, ..hit } } else { hit }); // half the gap in each step is nothing in the end
         }
-        let core = touch(&mover.core, &mover.core_path)?;
+        let core = match self.approach(fixed, (&mover.core, &mover.core_path)) {
+            Approach::Overlap => return self.impact_inside(fixed, mover),
+            Approach::Miss => return None,
+            Approach::Touch(touch) => touch,
+        };
         if gap(fixed, &mover.support, &mover.path.start) <= self.settings.speculative_distance {
             return Some(Hit::of_contact(core));
         }
-        let surface = touch(&mover.support, &mover.path);
-        let first = surface.filter(|surface| surface.time < core.time).unwrap_or(core);
-        Some(Hit::from_afar(first))
+        match self.approach(fixed, (&mover.support, &mover.path)) {
+            Approach::Touch(surface) if surface.time < core.time => Some(Hit::from_afar(surface)),
+            _ => Some(Hit::from_afar(core)),
+        }
+    }
+
+    /// The impact of what is left of a shape when violent steps have pushed its core in: its spine stays on this side, or at
+    /// least its very middle.
+    fn impact_inside(&self, fixed: &Support<'_>, mover: &Mover<'_>) -> Option<Hit> {
+        if let Some((spine, path)) = mover.spine() {
+            match self.approach(fixed, (&spine, &path)) {
+                Approach::Overlap => {}
+                Approach::Miss => return None,
+                Approach::Touch(touch) => return Some(Hit::of_contact(touch)),
+            }
+        }
+        let (middle, path) = mover.middle();
+        let Approach::Touch(touch) = self.approach(fixed, (&middle, &path)) else { return None };
+        let no_nearer = gap(fixed, &middle, &path.start) <= middle.radius();
+        // Half the gap in each step is nothing in the end.
+        let time = if no_nearer { 0.0 } else { touch.time };
+        Some(Hit { time, ..Hit::of_contact(touch) })
+    }
+
+    fn approach(&self, fixed: &Support<'_>, (shape, path): (&Support<'_>, &Sweep)) -> Approach {
+        approach(fixed, &Sweep::still(Pose::IDENTITY), shape, path, self.settings.slop)
     }
 }
 

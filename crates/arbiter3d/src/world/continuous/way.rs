@@ -4,7 +4,7 @@
 //! of two rotations takes the short way round and would take a rod that spins by 200° for one that spins by −160°. What
 //! the parts miss at the end (the spin of a body in free flight changes) is shared out evenly.
 
-use crate::math::{Pose, Real, Rotation, Vec3};
+use crate::math::{Pose, Real, Rotation, Vec3, min};
 use crate::world::shapes::ShapeSlot;
 
 /// Parts of a way turn by no more than this, radians.
@@ -14,24 +14,37 @@ const MOST_PARTS: usize = 64;
 
 /// The way of a body's centre frame through a step, or through what is left of one.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Way {
+pub(crate) struct Way {
     pub start: Pose,
     pub end: Pose,
     /// The rotation vector of the turn, radians.
     pub turn: Vec3,
     pub parts: usize,
+    /// Share of it at which the body stops, to stay there: 1 if it comes to the end. A shorter way made anew would lead past
+    /// the poses of this one, which have been found to be free.
+    until: Real,
 }
 
 impl Way {
     pub fn new(start: Pose, end: Pose, turn: Vec3) -> Self {
         let parts = turn.length() / LONGEST_TURN;
         // Not a number becomes zero.
-        Self { start, end, turn, parts: (parts.ceil() as usize).clamp(1, MOST_PARTS) }
+        Self { start, end, turn, parts: (parts.ceil() as usize).clamp(1, MOST_PARTS), until: 1.0 }
     }
 
     /// A body that stays where it is.
     pub fn still(pose: Pose) -> Self {
-        Self { start: pose, end: pose, turn: Vec3::ZERO, parts: 1 }
+        Self { start: pose, end: pose, turn: Vec3::ZERO, parts: 1, until: 1.0 }
+    }
+
+    /// The same way for a body that stops at a share of it.
+    pub fn stopped(self, time: Real) -> Self {
+        Self { until: min(time, self.until), ..self }
+    }
+
+    /// Where the body comes to.
+    pub fn last(&self) -> Pose {
+        if self.until < 1.0 { self.at(self.until) } else { self.end }
     }
 
     /// How far some point of a shape of the body goes at most.
@@ -67,6 +80,7 @@ impl Way {
 
     /// Where the body is at a share of its way, from 0 to 1.
     pub fn at(&self, time: Real) -> Pose {
+        let time = min(time, self.until);
         if self.parts == 1 {
             return self.start.interpolate(&self.end, time);
         }
