@@ -17,7 +17,13 @@ Without a command, `run` is meant. After a run, open the page it names in a brow
 
 /// Simulates rigid bodies: runs scenes, replays them in a page, measures them.
 #[derive(Debug, Parser)]
-#[command(name = "arbiter3d", version, override_usage = "arbiter3d [COMMAND] [OPTIONS]", after_help = AFTER_HELP, disable_help_subcommand = true)]
+#[command(
+    name = "arbiter3d",
+    version,
+    override_usage = "arbiter3d [COMMAND] [OPTIONS]",
+    after_help = AFTER_HELP,
+    disable_help_subcommand = true
+)]
 pub(crate) struct Arguments {
     #[command(subcommand)]
     pub command: Command,

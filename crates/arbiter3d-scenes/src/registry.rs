@@ -198,6 +198,18 @@ pub static SCENES: &[Scene] = &[
         build: scenes::piles::spheres,
     },
     Scene {
+        name: "cans",
+        description: "1,000 cans fall into a pit, where they stay awake",
+        size: Size::new("cans", 1000, 1_000_000),
+        build: scenes::piles::cans,
+    },
+    Scene {
+        name: "ellipsoids",
+        description: "1,000 ellipsoids fall into a pit, where they stay awake",
+        size: Size::new("ellipsoids", 1000, 1_000_000),
+        build: scenes::piles::ellipsoids,
+    },
+    Scene {
         name: "boxes_rain",
         description: "a small start: 400 boxes, balls, capsules and rocks fall into a tray",
         size: Size::new("bodies", 400, 1_000_000),

@@ -78,6 +78,25 @@ fn compounds_come_to_rest_in_the_pit() {
     assert!(scene.world.deepest_penetration() < 0.02, "{} m", scene.world.deepest_penetration());
 }
 
+/// Cans and ellipsoids fill their pit and stay in it, and hardly move after five seconds.
+#[test]
+fn heaps_of_cans_and_ellipsoids_come_to_rest_in_the_pit() {
+    for name in ["cans", "ellipsoids"] {
+        let options = SceneOptions { size: Some(300), ..SceneOptions::default() };
+        let mut scene = find(name).unwrap().build(&options).unwrap();
+        run(&mut scene, 300);
+        for id in dynamic(&scene.world) {
+            let body = scene.world.body(id).unwrap();
+            let at = body.position();
+            assert!(at.y > 0.18 && at.x.abs() < 3.81 && at.z.abs() < 3.81, "{name}: {id:?} at {at}");
+            let speed = body.linear_velocity().length();
+            assert!(speed < 0.5, "{name}: {id:?} moves at {speed} m/s");
+        }
+        let deepest = scene.world.deepest_penetration();
+        assert!(deepest < 0.015, "{name}: {deepest} m");
+    }
+}
+
 /// A ball with restitution e that falls from h rises to e² h.
 #[test]
 fn balls_rise_by_the_square_of_their_restitution() {

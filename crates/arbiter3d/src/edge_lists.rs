@@ -100,6 +100,7 @@ impl EdgeLists {
 #[cfg(test)]
 mod tests {
     use super::EdgeLists;
+    use crate::random::Random;
     use std::collections::BTreeMap;
 
     /// 20,000 random edits on 60 places and 9 bodies: each body has the ties of a model, the latest first.
@@ -107,15 +108,14 @@ mod tests {
     fn bodies_have_their_ties_whatever_came_and_went() {
         let (mut lists, mut model) = (EdgeLists::default(), BTreeMap::new());
         lists.grow(60, 9);
-        let mut state = 11_u64;
+        let mut random = Random(11);
         for edit in 0..20_000_u32 {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            let place = (state >> 33) as u32 % 60;
+            let place = random.below(60);
             if let Some((_, bodies)) = model.remove(&place) {
                 lists.unlink(place, bodies);
             } else {
-                let first = (state >> 40) as u32 % 9;
-                let bodies = [first, (first + 1 + (state >> 50) as u32 % 8) % 9];
+                let first = random.below(9);
+                let bodies = [first, (first + 1 + random.below(8)) % 9];
                 model.insert(place, (edit, bodies));
                 lists.link(place, bodies);
             }

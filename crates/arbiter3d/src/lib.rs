@@ -37,6 +37,8 @@ pub mod narrow_phase;
 mod parallel;
 mod place_table;
 mod query;
+#[cfg(test)]
+mod random;
 mod shape;
 mod simd;
 mod solver;
@@ -50,13 +52,14 @@ pub use character::{
     CharacterController, CharacterSettings, ContactPlane, Ground, PlaneLimit, PlaneSolution, ShapeMover, SlideResult,
     solve_planes,
 };
-pub use query::{Ray, ShapeCast, ShapeDistance, ShapeHit, cast_ray, distance, overlaps};
+pub use query::{ShapeCast, ShapeDistance, distance, overlaps};
 #[cfg(feature = "decomposition")]
 pub use shape::DecompositionSettings;
 pub use shape::{
     Capsule, Compound, CompoundChild, Cone, ConvexHull, ConvexShape, Cuboid, Custom, Cylinder, FieldDiagonals,
-    FieldSide, HalfEdge, HalfSpace, HeightField, MassProperties, MeshRayHit, MeshSides, Plane, PointCloud, Rounded,
-    Shape, ShapeError, Sphere, TaperedCapsule, Transformed, Triangle, TriangleMesh, VoxelGrid,
+    FieldSide, HalfEdge, HalfSpace, HeightField, MassProperties, MeshRayHit, MeshSides, Plane, PointCloud, Ray,
+    Rounded, Shape, ShapeError, ShapeHit, Sphere, TaperedCapsule, Transformed, Triangle, TriangleMesh, VoxelGrid,
+    cast_ray,
 };
 pub use simd::{SimdLevel, UnknownSimdLevel};
 pub use vehicle::{

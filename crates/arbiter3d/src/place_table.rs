@@ -121,6 +121,7 @@ impl PlaceTable {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Random;
     use std::collections::BTreeMap;
 
     /// 60,000 random edits on 500 keys, of which many meet in a few slots: as a sorted map has it.
@@ -129,10 +130,9 @@ mod tests {
         let mut keys: Vec<u64> = Vec::new();
         let (mut table, mut model) = (PlaceTable::default(), BTreeMap::new());
         let hash = |key: u64| mix(0, key) & 0x3f0f;
-        let mut state = 5_u64;
+        let mut random = Random(5);
         for _ in 0..60_000 {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            let key = (state >> 33) % 500;
+            let key = u64::from(random.below(500));
             let found = table.find(hash(key), |place| keys[place as usize] == key);
             assert_eq!(found, model.get(&key).copied());
             if let Some(place) = found {

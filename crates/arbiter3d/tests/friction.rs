@@ -57,7 +57,8 @@ fn a_box_slides_below_the_friction_angle() {
     }
 }
 
-/// A ball on a ramp rolls at 5/7 g sin θ when it grips (μ > 2/7 tan θ), and slips at g (sin θ − μ cos θ) when it does not.
+/// A ball on a ramp rolls at 5/7 g sin θ when it grips (μ > 2/7 tan θ), and slips at g (sin θ − μ cos θ) when it does
+/// not.
 #[test]
 fn a_ball_rolls_or_slips_down_a_ramp() {
     for (friction, expected) in [(0.6, 5.0 / 7.0 * 0.5), (0.1, 0.5 - 0.1 * 0.866_025_4)] {
@@ -439,8 +440,8 @@ fn anisotropy_is_checked_and_may_be_set_on_an_arbiter() {
 }
 
 /// A plate that twists on the spot is braked by the friction that its corners have the way they slide there: of a point at
-/// (x, z) seen from the middle, the friction ellipse leaves `μ √((ratio z)² + x²)` as torque a newton, if it is `ratio` times
-/// smaller along x.
+/// (x, z) seen from the middle, the friction ellipse leaves `μ √((ratio z)² + x²)` as torque a newton, if it is `ratio`
+/// times smaller along x.
 #[test]
 fn a_twisting_plate_is_braked_by_the_friction_ellipse() {
     let (half, friction) = (Vec3::new(0.6, 0.1, 0.3), 0.4);

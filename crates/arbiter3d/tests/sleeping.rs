@@ -56,8 +56,8 @@ fn a_body_sleeps_after_its_time() {
     }
 }
 
-/// The speed of the surface counts, not that of a sphere around the body: a log of 20 m that rolls about its own axis with 0.03 m/s at
-/// its bark sleeps, the same spin end over end (1 m/s at the ends) keeps it awake.
+/// The speed of the surface counts, not that of a sphere around the body: a log of 20 m that rolls about its own axis
+/// with 0.03 m/s at its bark sleeps, the same spin end over end (1 m/s at the ends) keeps it awake.
 #[test]
 fn a_long_body_that_rolls_slowly_sleeps() {
     for (spin, sleeps) in [(Vec3::X * 0.1, true), (Vec3::Y * 0.1, false)] {

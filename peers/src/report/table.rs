@@ -1,9 +1,9 @@
 //! The results for people: one aligned line for each scene, engine and number of threads.
 //!
 //! `ms/step` is the median over the repetitions of the mean step, `min` the least of them, `floor` the mean over the steps of
-//! the fastest time of each, `worst10%` the mean of the slowest tenth. `ratio` is the fastest peer's time over ours; that peer has a 1.
-//! `contacts` is the engine's own count (of points, of pairs, as it counts); `points`, `height` (mean, metres), `depth`
-//! (deepest penetration), `awake`, `drift` (sideways, metres) and `energy` are measured alike for all.
+//! the fastest time of each, `worst10%` the mean of the slowest tenth. `ratio` is the fastest peer's time over ours;
+//! that peer has a 1. `contacts` is the engine's own count (of points, of pairs, as it counts); `points`, `height`
+//! (mean, metres), `depth` (deepest penetration), `awake`, `drift` (sideways, metres) and `energy` are measured alike for all.
 
 use super::{Row, geometric_means, ratios, worst};
 use crate::engine::Kind;

@@ -201,3 +201,28 @@ pub(crate) fn boxes_rain(options: &SceneOptions, size: usize) -> Result<BuiltSce
     }
     scene.finish(600)
 }
+
+/// 1,000 cans, turned at random, fall into a pit and stay awake: the steps between 4 and 5 s are those of a heap at rest.
+pub(crate) fn cans(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
+    heap(options, size, &Shape::cylinder(0.3, 0.2)?)
+}
+
+/// The same of ellipsoids, which know no face and no edge.
+pub(crate) fn ellipsoids(options: &SceneOptions, size: usize) -> Result<BuiltScene, Error> {
+    heap(options, size, &Shape::ellipsoid(Vec3::new(0.2, 0.3, 0.25))?)
+}
+
+/// Bodies of one kind and no more than 35 cm in reach fall into a tray of 8 × 8 m: 10 × 10 a layer.
+fn heap(options: &SceneOptions, size: usize, shape: &Shape) -> Result<BuiltScene, Error> {
+    let mut scene = Builder::sleepless(options, size)?;
+    tray(&mut scene, 4.0, 6.0)?;
+    let mut random = scene.random(17);
+    let shape = plain(shape.clone()).rolling_resistance(0.05);
+    for index in 0..scene.size {
+        let (layer, x, z) = (index / 100, index / 10 % 10, index % 10);
+        let position = Vec3::new(x as Real - 4.5, layer as Real, z as Real - 4.5) * 0.77 + Vec3::new(0.0, 1.0, 0.0);
+        let body = BodyDefinition::dynamic().at(position).rotated(random.rotation());
+        scene.add(&body, &shape)?;
+    }
+    scene.finish(300)
+}

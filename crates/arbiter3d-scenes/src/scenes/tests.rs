@@ -33,6 +33,8 @@ fn scenes_have_their_published_counts() {
         ("compound_rain", None, 512),
         ("box_floor_slide", None, 16),
         ("spheres10k", None, 10_000),
+        ("cans", None, 1000),
+        ("ellipsoids", None, 1000),
         ("trees100", None, 50),
         ("sleeping_field", None, 100_100),
         ("sleeping_all", None, 100_000),

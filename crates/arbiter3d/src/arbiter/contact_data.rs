@@ -206,7 +206,10 @@ impl ContactData {
     pub fn contact_count(&self) -> usize {
         (self.usage_mask & 15).count_ones() as usize
     }
+}
 
+/// The material that the contacts share, to read.
+impl ContactData {
     /// Coulomb friction of a contact (slot 0 to 3): of shapes with several materials, contacts may differ.
     #[must_use]
     pub fn friction_of(&self, slot: usize) -> Real {
@@ -256,6 +259,16 @@ impl ContactData {
         self.solve_mode
     }
 
+    /// The direction (unit vector, world axes) along which friction is a share of [`ContactData::friction`], and that
+    /// share.
+    #[must_use]
+    pub fn anisotropy(&self) -> Option<(Vec3, Real)> {
+        (self.flags & ANISOTROPIC != 0).then_some((self.friction_direction, self.friction_ratio))
+    }
+}
+
+/// The material, to change.
+impl ContactData {
     /// Sets the friction for the arbiter's life.
     ///
     /// # Errors
@@ -303,13 +316,6 @@ impl ContactData {
         self.solve_mode = mode;
     }
 
-    /// The direction (unit vector, world axes) along which friction is a share of [`ContactData::friction`], and that
-    /// share.
-    #[must_use]
-    pub fn anisotropy(&self) -> Option<(Vec3, Real)> {
-        (self.flags & ANISOTROPIC != 0).then_some((self.friction_direction, self.friction_ratio))
-    }
-
     /// Sets, for the arbiter's life, a direction (unit vector, world axes) along which friction is `ratio` times what
     /// it is across; `None` makes it the same in all directions. The direction stands still: to have it turn with a
     /// body, set it before each solve, or use [`Material::anisotropy`](crate::Material::anisotropy).
@@ -333,7 +339,10 @@ impl ContactData {
             self.flags |= ANISOTROPIC;
         }
     }
+}
 
+/// The contacts, to change.
+impl ContactData {
     /// Turns the normal of a contact; it points from body 1 to body 2, world axes.
     ///
     /// # Errors

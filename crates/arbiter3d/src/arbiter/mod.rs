@@ -8,8 +8,10 @@
 //!
 //! ```text
 //!   begin ──► contacts found or registered, cached, solved, moved with the bodies ──► broken ──► end, back to the pool
+//!   
 //!               ▲                                                              │
 //!               └────────────────────── each step ─────────────────────────────┘
+//!               
 //! ```
 //!
 //! Nothing here knows shapes, trees or the solver: the same code serves contacts from any source.

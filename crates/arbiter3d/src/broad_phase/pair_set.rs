@@ -148,24 +148,20 @@ impl PairSet {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Random;
     use std::collections::BTreeMap;
-
-    fn random(state: &mut u64) -> u32 {
-        *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (*state >> 33) as u32
-    }
 
     /// 200,000 random edits on few enough pairs that inserts, hits and removals are all common.
     #[test]
     fn behaves_like_a_sorted_map() {
         let (mut set, mut model) = (PairSet::new(), BTreeMap::new());
-        let mut state = 7;
+        let mut random = Random(7);
         for step in 0..200_000 {
             // The range breathes, so the table fills up and empties again.
             let range = if step / 20_000 % 2 == 0 { 200 } else { 20 };
-            let (a, b) = (random(&mut state) % range, random(&mut state) % range);
+            let (a, b) = (random.below(range), random.below(range));
             let (low, high) = (a.min(b), a.max(b));
-            match random(&mut state) % 3 {
+            match random.below(3) {
                 0 => assert_eq!(set.insert(a, b, step), model.insert((low, high), step)),
                 1 => assert_eq!(set.remove(b, a), model.remove(&(low, high))),
                 _ => assert_eq!(set.get(b, a), model.get(&(low, high)).copied()),

@@ -1,22 +1,9 @@
 //! Pairs against brute force.
 
 use super::*;
+use crate::random::Random;
 use std::cell::Cell;
 use std::collections::BTreeSet;
-
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, end: u32) -> u32 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        ((self.0 >> 33) as u32) % end
-    }
-
-    fn vector(&mut self) -> Vec3 {
-        let mut signed = || self.below(20_001) as Real / 10_000.0 - 1.0;
-        Vec3::new(signed(), signed(), signed())
-    }
-}
 
 #[derive(Clone, Copy)]
 struct Shape {

@@ -15,7 +15,7 @@
 //! Small errors of the height (below a twentieth of the skin) are left alone, so a character at rest has a vertical
 //! speed of exactly zero. Call [`CharacterController::update`] before each [`World::step`] with the same `dt`.
 
-use super::mover::{ContactPlane, Ground, ShapeMover};
+use super::mover::{Ground, MoverLists, ShapeMover};
 use super::planes::{PlaneLimit, solve_planes};
 use crate::error::{Error, finite, finite_vec, in_range, unit_vec};
 use crate::id::BodyId;
@@ -129,6 +129,9 @@ pub struct CharacterController {
     rising: bool,
     /// Caught between things that leave no room.
     crushed: bool,
+    lists: MoverLists,
+    /// What the ground does not carry it through: all that the filter excludes, and the ground.
+    excluded: Vec<BodyId>,
 }
 
 impl CharacterController {
@@ -152,6 +155,8 @@ impl CharacterController {
             ground: None,
             rising: false,
             crushed: false,
+            lists: MoverLists::default(),
+            excluded: Vec::new(),
         })
     }
 
@@ -248,18 +253,25 @@ impl CharacterController {
     pub fn update(&mut self, world: &mut World, wanted: Vec3, dt: Real) -> Result<(), Error> {
         in_range("dt", dt, 1e-6, 1.0)?;
         let wanted = self.level(finite_vec("wanted velocity", wanted)?);
-        let (push, free) = self.mover(&self.settings.filter).recover(world, self.center)?;
+        let mut lists = std::mem::take(&mut self.lists);
+        let result = self.update_with(world, wanted, dt, &mut lists);
+        self.lists = lists;
+        result
+    }
+
+    fn update_with(&mut self, world: &mut World, wanted: Vec3, dt: Real, lists: &mut MoverLists) -> Result<(), Error> {
+        let (push, free) = self.mover(&self.settings.filter).recover_with(world, self.center, lists)?;
         self.center += push;
         self.crushed = !free;
-        self.find_ground(world)?;
+        self.find_ground(world, lists)?;
         let base = self.ground.map_or(Vec3::ZERO, |ground| ground.velocity);
         if self.ground.is_none() {
-            self.fly(world, wanted, dt)?;
-            return self.push_bodies(world, base + wanted, dt);
+            self.fly(world, wanted, dt, lists)?;
+            return self.push_bodies(world, base + wanted, dt, lists);
         }
-        self.walk(world, wanted, dt)?;
-        self.push_bodies(world, base + wanted, dt)?;
-        self.carry(world, dt)
+        self.walk(world, wanted, dt, lists)?;
+        self.push_bodies(world, base + wanted, dt, lists)?;
+        self.carry(world, dt, lists)
     }
 
     fn mover<'a>(&'a self, filter: &QueryFilter<'a>) -> ShapeMover<'a> {
@@ -283,11 +295,11 @@ impl CharacterController {
     }
 
     /// Looks for ground: from the ground as far down as a step, from the air only what is touched and not left behind.
-    fn find_ground(&mut self, world: &World) -> Result<(), Error> {
+    fn find_ground(&mut self, world: &World, lists: &mut MoverLists) -> Result<(), Error> {
         let up = self.settings.up;
         let step = self.settings.step_height;
         let reach = if self.ground.is_some() { step } else { self.slack() };
-        let found = self.mover(&self.settings.filter).probe_ground(world, self.center, max(step, reach))?;
+        let found = self.mover(&self.settings.filter).probe_ground_with(world, self.center, max(step, reach), lists)?;
         let Some(found) = found else {
             self.ground = None;
             return Ok(());
@@ -295,19 +307,18 @@ impl CharacterController {
         let rise = (self.velocity - found.velocity).dot(up);
         self.rising &= rise > 1e-3;
         let touches = found.distance <= reach && !self.rising && (self.ground.is_some() || rise <= 1e-3);
-        let stands = touches && (found.walkable || self.is_wedged(world)?);
+        let stands = touches && (found.walkable || self.is_wedged(world, lists)?);
         self.ground = stands.then_some(found);
         Ok(())
     }
 
     /// Whether steep things around it keep it from sinking: a crevice holds as well as a floor.
-    fn is_wedged(&self, world: &World) -> Result<bool, Error> {
-        let mover = self.mover(&self.settings.filter);
-        let mut planes = Vec::new();
-        mover.collect_planes(world, self.center, 1.5 * self.settings.skin, &mut planes)?;
-        let limits: Vec<PlaneLimit> =
-            planes.iter().map(|plane| PlaneLimit { normal: plane.normal, least: 0.0 }).collect();
-        Ok(solve_planes(-self.settings.up, &limits).vector.length() < 0.1)
+    fn is_wedged(&self, world: &World, lists: &mut MoverLists) -> Result<bool, Error> {
+        self.mover(&self.settings.filter).planes_at(world, self.center, 1.5 * self.settings.skin, lists)?;
+        let MoverLists { planes, limits, .. } = lists;
+        limits.clear();
+        limits.extend(planes.iter().map(|plane| PlaneLimit { normal: plane.normal, least: 0.0 }));
+        Ok(solve_planes(-self.settings.up, limits).vector.length() < 0.1)
     }
 
     /// Towards a velocity, by at most `change`.
@@ -317,7 +328,7 @@ impl CharacterController {
         if length <= change { to } else { from + way * (change / length) }
     }
 
-    fn walk(&mut self, world: &World, wanted: Vec3, dt: Real) -> Result<(), Error> {
+    fn walk(&mut self, world: &World, wanted: Vec3, dt: Real, lists: &mut MoverLists) -> Result<(), Error> {
         let Some(ground) = self.ground else { return Ok(()) };
         let settings = &self.settings;
         let up = settings.up;
@@ -332,17 +343,17 @@ impl CharacterController {
             let normal = if rise >= self.walkable_cosine { ground.normal } else { up };
             let along = level - up * (level.dot(normal) / normal.dot(up));
             let along = along * (level.length() / along.length());
-            let slide = mover.slide(world, position, along)?;
+            let slide = mover.slide_with(world, position, along, lists)?;
             let progress = |end: Vec3| (end - self.center).dot(level) / level.length();
             position = slide.position;
             if slide.blocked && progress(position) < 0.95 * progress(self.center + along) {
-                let stepped = mover.step_up(world, self.center, level, settings.step_height)?;
+                let stepped = mover.step_up_with(world, self.center, (level, settings.step_height), lists)?;
                 if let Some(stepped) = stepped.filter(|&end| progress(end) > progress(position) + 1e-4) {
                     position = stepped;
                 }
             }
         }
-        let found = mover.probe_ground(world, position, settings.step_height)?;
+        let found = mover.probe_ground_with(world, position, settings.step_height, lists)?;
         let moved = self.level(position - self.center);
         // Wedged in a crevice there is nothing to walk on but what held before.
         let held = found.filter(|found| found.walkable || !ground.walkable);
@@ -350,7 +361,7 @@ impl CharacterController {
             let sink = if found.distance.abs() > self.slack() { found.distance } else { 0.0 };
             if sink > 0.0 {
                 position += mover.advance(world, position, up * -sink, &[])?.0;
-                position = mover.raised(world, position)?;
+                position = mover.raised(world, position, lists)?;
             } else if found.normal.dot(up) >= self.walkable_cosine {
                 position -= up * sink;
             }
@@ -360,7 +371,7 @@ impl CharacterController {
         Ok(())
     }
 
-    fn fly(&mut self, world: &World, wanted: Vec3, dt: Real) -> Result<(), Error> {
+    fn fly(&mut self, world: &World, wanted: Vec3, dt: Real, lists: &mut MoverLists) -> Result<(), Error> {
         let settings = &self.settings;
         let up = settings.up;
         let (level, fall) = (self.level(self.velocity), self.velocity.dot(up));
@@ -369,47 +380,48 @@ impl CharacterController {
             level
         } else {
             let change = Self::steer(level, wanted, settings.air_acceleration * dt) - level;
-            level + self.change_beside_walls(world, change)?
+            level + self.change_beside_walls(world, change, lists)?
         };
         let next = max(fall - settings.gravity * dt, -settings.max_fall_speed);
         let before = self.velocity;
         let velocity = level + up * next;
         let mover = self.mover(&settings.filter);
-        let slide = mover.slide(world, self.center, (self.level(before) + level + up * (fall + next)) * (0.5 * dt))?;
-        let mut planes = Vec::new();
-        mover.collect_planes(world, slide.position, 1.1 * settings.skin, &mut planes)?;
-        self.velocity = self.clipped(world, velocity, &planes);
+        let way = (self.level(before) + level + up * (fall + next)) * (0.5 * dt);
+        let slide = mover.slide_with(world, self.center, way, lists)?;
+        mover.planes_at(world, slide.position, 1.1 * settings.skin, lists)?;
+        self.velocity = self.clipped(world, velocity, lists);
         self.center = slide.position;
-        self.find_ground(world)
+        self.find_ground(world, lists)
     }
 
     /// A change of the level velocity without what points into walls and steep slopes: else leaning against a slope
     /// would slow the slide down on it.
-    fn change_beside_walls(&self, world: &World, change: Vec3) -> Result<Vec3, Error> {
+    fn change_beside_walls(&self, world: &World, change: Vec3, lists: &mut MoverLists) -> Result<Vec3, Error> {
         let mover = self.mover(&self.settings.filter);
-        let mut planes = Vec::new();
-        mover.collect_planes(world, self.center, 1.1 * self.settings.skin, &mut planes)?;
-        let limits: Vec<PlaneLimit> =
-            planes.iter().filter_map(|p| mover.wall(PlaneLimit { normal: p.normal, least: 0.0 })).collect();
-        Ok(solve_planes(change, &limits).vector)
+        mover.planes_at(world, self.center, 1.1 * self.settings.skin, lists)?;
+        let MoverLists { planes, limits, .. } = lists;
+        limits.clear();
+        limits.extend(planes.iter().filter_map(|p| mover.wall(PlaneLimit { normal: p.normal, least: 0.0 })));
+        Ok(solve_planes(change, limits).vector)
     }
 
-    /// A velocity without what points into the planes, each of which moves with its body.
-    fn clipped(&self, world: &World, velocity: Vec3, planes: &[ContactPlane]) -> Vec3 {
+    /// A velocity without what points into the planes listed, each of which moves with its body.
+    fn clipped(&self, world: &World, velocity: Vec3, lists: &mut MoverLists) -> Vec3 {
         let mover = self.mover(&self.settings.filter);
-        let mut limits = Vec::new();
-        for plane in planes {
+        let MoverLists { planes, limits, .. } = lists;
+        limits.clear();
+        for plane in &*planes {
             let surface = world.body(plane.body).map_or(Vec3::ZERO, |body| body.velocity_at(plane.point));
             limits.push(PlaneLimit { normal: plane.normal, least: surface.dot(plane.normal) });
         }
         for index in 0..limits.len() {
             limits.extend(mover.wall(limits[index]));
         }
-        solve_planes(velocity, &limits).vector
+        solve_planes(velocity, limits).vector
     }
 
     /// Goes with the ground for the coming step, along a circle where it turns.
-    fn carry(&mut self, world: &World, dt: Real) -> Result<(), Error> {
+    fn carry(&mut self, world: &World, dt: Real, lists: &mut MoverLists) -> Result<(), Error> {
         let Some(ground) = self.ground else { return Ok(()) };
         let Some(body) = world.body(ground.body) else { return Ok(()) };
         if body.kind() == BodyKind::Static || !body.is_awake() {
@@ -422,18 +434,22 @@ impl CharacterController {
         if way.length() < 1e-6 {
             return Ok(());
         }
-        let excluded: Vec<BodyId> = self.settings.filter.exclude_bodies.iter().copied().chain([ground.body]).collect();
+        let mut excluded = std::mem::take(&mut self.excluded);
+        excluded.clear();
+        excluded.extend(self.settings.filter.exclude_bodies.iter().copied().chain([ground.body]));
         let filter = QueryFilter { exclude_bodies: &excluded, ..self.settings.filter };
-        self.center = self.mover(&filter).slide(world, self.center, way)?.position;
+        let slide = self.mover(&filter).slide_with(world, self.center, way, lists);
+        self.excluded = excluded;
+        self.center = slide?.position;
         Ok(())
     }
 
     /// Pushes the dynamic bodies in the way towards the wanted velocity, and presses on what is below.
-    fn push_bodies(&self, world: &mut World, wanted: Vec3, dt: Real) -> Result<(), Error> {
+    fn push_bodies(&self, world: &mut World, wanted: Vec3, dt: Real, lists: &mut MoverLists) -> Result<(), Error> {
         let settings = &self.settings;
-        let mut planes = Vec::new();
-        self.mover(&settings.filter).collect_planes(world, self.center, 1.5 * settings.skin, &mut planes)?;
-        for plane in &planes {
+        self.mover(&settings.filter).planes_at(world, self.center, 1.5 * settings.skin, lists)?;
+        let planes = &lists.planes;
+        for plane in planes {
             let Some(body) = world.body(plane.body) else { continue };
             let below = plane.normal.dot(settings.up) >= self.walkable_cosine;
             if body.kind() != BodyKind::Dynamic || below {

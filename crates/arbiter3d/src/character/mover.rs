@@ -22,7 +22,7 @@ use crate::id::{BodyId, ShapeId};
 use crate::math::{Pose, Real, Rotation, Vec3, max, min, normalize_or};
 use crate::query::ShapeCast;
 use crate::shape::Shape;
-use crate::world::{CastHit, Material, QueryFilter, ShapeRef, World, stops};
+use crate::world::{CastHit, Material, QueryFilter, ShapeContacts, ShapeRef, World, stops};
 
 /// Rounds of a slide. Each ends at a new obstacle; three make a corner.
 const ROUNDS: usize = 6;
@@ -52,6 +52,12 @@ pub struct ContactPlane {
     pub body: BodyId,
     /// Shape it belongs to.
     pub shape: ShapeId,
+}
+
+impl ContactPlane {
+    fn overlaps(&self) -> bool {
+        self.separation <= 0.0
+    }
 }
 
 /// What a mover stands on, or would soon.
@@ -86,6 +92,17 @@ pub struct SlideResult {
     pub position: Vec3,
     /// Whether something kept it from its target.
     pub blocked: bool,
+}
+
+/// Lists that the questions of a mover fill, kept from one to the next: a character that moves on allocates nothing.
+#[derive(Clone, Debug, Default)]
+pub(super) struct MoverLists {
+    contacts: Vec<ShapeContacts>,
+    /// Those of the last [`ShapeMover::planes_at`].
+    pub planes: Vec<ContactPlane>,
+    pub limits: Vec<PlaneLimit>,
+    /// What a slide has met: normal, gap, and where the gap was that.
+    met: Vec<(Vec3, Real, Vec3)>,
 }
 
 /// A convex shape that stands upright and is moved by hand.
@@ -145,10 +162,17 @@ impl<'a> ShapeMover<'a> {
         self.filter.predicate.is_none_or(|accepts| accepts(shape)) && stops(shape, (self.shape, pose))
     }
 
-    /// Where the shape first meets something on a way from a position.
-    fn cast(&self, world: &World, position: Vec3, way: Vec3, ignored: &[ShapeId]) -> Result<Option<CastHit>, Error> {
+    /// Where the shape first meets something on a way from a position; what it overlaps, by its planes, does not count.
+    fn cast(
+        &self,
+        world: &World,
+        position: Vec3,
+        way: Vec3,
+        planes: &[ContactPlane],
+    ) -> Result<Option<CastHit>, Error> {
         let start = self.pose(position);
-        let sees = |shape: &ShapeRef<'_>| !ignored.contains(&shape.id()) && self.sees(&start, shape);
+        let ignores = |shape: ShapeId| planes.iter().any(|plane| plane.overlaps() && plane.shape == shape);
+        let sees = |shape: &ShapeRef<'_>| !ignores(shape.id()) && self.sees(&start, shape);
         let filter = QueryFilter { predicate: Some(&sees), ..self.filter };
         world.cast_shape(&ShapeCast::along(self.shape, start, way), &filter)
     }
@@ -179,11 +203,34 @@ impl<'a> ShapeMover<'a> {
         margin: Real,
         planes: &mut Vec<ContactPlane>,
     ) -> Result<(), Error> {
+        self.append_planes(world, (position, margin), &mut Vec::new(), planes)
+    }
+
+    /// The planes closer than `margin` to the shape at a position, into the lists.
+    pub(super) fn planes_at(
+        &self,
+        world: &World,
+        position: Vec3,
+        margin: Real,
+        lists: &mut MoverLists,
+    ) -> Result<(), Error> {
+        lists.planes.clear();
+        self.append_planes(world, (position, margin), &mut lists.contacts, &mut lists.planes)
+    }
+
+    fn append_planes(
+        &self,
+        world: &World,
+        (position, margin): (Vec3, Real),
+        found: &mut Vec<ShapeContacts>,
+        planes: &mut Vec<ContactPlane>,
+    ) -> Result<(), Error> {
         self.check(position)?;
         let pose = self.pose(position);
         let sees = |shape: &ShapeRef<'_>| self.sees(&pose, shape);
         let filter = QueryFilter { predicate: Some(&sees), ..self.filter };
-        for contacts in world.collide_shape(self.shape, &pose, margin, &filter)? {
+        world.collect_contacts((self.shape, &pose), margin, &filter, found)?;
+        for contacts in &*found {
             let (body, shape) = (contacts.body, contacts.shape);
             planes.extend(contacts.manifold.points().iter().map(|point| ContactPlane {
                 normal: point.normal,
@@ -215,29 +262,38 @@ impl<'a> ShapeMover<'a> {
     /// # Errors
     /// If a number is not finite or out of its range.
     pub fn slide(&self, world: &World, start: Vec3, displacement: Vec3) -> Result<SlideResult, Error> {
+        self.slide_with(world, start, displacement, &mut MoverLists::default())
+    }
+
+    /// As [`ShapeMover::slide`], with lists to fill.
+    pub(super) fn slide_with(
+        &self,
+        world: &World,
+        start: Vec3,
+        displacement: Vec3,
+        lists: &mut MoverLists,
+    ) -> Result<SlideResult, Error> {
         self.check(start)?;
         let target = finite_vec("target of the mover", start + displacement)?;
         let mut position = start;
-        let (mut planes, mut limits) = (Vec::new(), Vec::new());
-        // Normal, gap, and where the gap was that.
-        let mut met: Vec<(Vec3, Real, Vec3)> = Vec::new();
+        lists.met.clear();
         for _ in 0..ROUNDS {
             if (target - position).length() <= SHORTEST {
                 return Ok(SlideResult { position, blocked: false });
             }
-            planes.clear();
-            self.collect_planes(world, position, self.skin * REACH, &mut planes)?;
+            self.planes_at(world, position, self.skin * REACH, lists)?;
+            let MoverLists { planes, limits, met, .. } = &mut *lists;
             limits.clear();
             limits.extend(planes.iter().map(|plane| self.limit(plane.normal, plane.separation)));
             limits.extend(met.iter().map(|&(normal, gap, at)| self.limit(normal, gap + (position - at).dot(normal))));
             for index in 0..limits.len() {
                 limits.extend(self.wall(limits[index]));
             }
-            let way = solve_planes(target - position, &limits).vector;
+            let way = solve_planes(target - position, limits).vector;
             if way.length() <= SHORTEST {
                 break;
             }
-            let (moved, hit) = self.advance(world, position, way, &planes)?;
+            let (moved, hit) = self.advance(world, position, way, planes)?;
             position += moved;
             if let Some(hit) = hit {
                 let gap = (way * hit.fraction - moved).dot(-hit.normal);
@@ -258,11 +314,10 @@ impl<'a> ShapeMover<'a> {
     ) -> Result<(Vec3, Option<CastHit>), Error> {
         let length = way.length();
         let direction = way / length;
-        let ignored: Vec<ShapeId> = planes.iter().filter(|p| p.separation <= 0.0).map(|p| p.shape).collect();
-        let length = if !ignored.is_empty() { min(length, self.skin) } else { length };
+        let length = if planes.iter().any(ContactPlane::overlaps) { min(length, self.skin) } else { length };
         // Look a little farther than the way, so that the skin is kept at its end too.
         let reach = direction * (length + 2.0 * self.skin);
-        let Some(hit) = self.cast(world, position, reach, &ignored)? else { return Ok((direction * length, None)) };
+        let Some(hit) = self.cast(world, position, reach, planes)? else { return Ok((direction * length, None)) };
         let approach = max(-direction.dot(hit.normal), 0.05);
         let free = hit.fraction * (length + 2.0 * self.skin) - self.skin / approach;
         if free >= length {
@@ -279,17 +334,26 @@ impl<'a> ShapeMover<'a> {
     /// # Errors
     /// If a number is not finite or out of its range.
     pub fn recover(&self, world: &World, position: Vec3) -> Result<(Vec3, bool), Error> {
-        let (mut planes, mut limits) = (Vec::new(), Vec::new());
+        self.recover_with(world, position, &mut MoverLists::default())
+    }
+
+    /// As [`ShapeMover::recover`], with lists to fill.
+    pub(super) fn recover_with(
+        &self,
+        world: &World,
+        position: Vec3,
+        lists: &mut MoverLists,
+    ) -> Result<(Vec3, bool), Error> {
         let mut total = Vec3::ZERO;
         for _ in 0..4 {
-            planes.clear();
-            self.collect_planes(world, position + total, self.skin * REACH, &mut planes)?;
+            self.planes_at(world, position + total, self.skin * REACH, lists)?;
+            let MoverLists { planes, limits, .. } = &mut *lists;
             if planes.iter().all(|plane| plane.separation >= 0.95 * self.skin) {
                 return Ok((total, true));
             }
             limits.clear();
             limits.extend(planes.iter().map(|p| PlaneLimit { normal: p.normal, least: self.skin - p.separation }));
-            let solution = solve_planes(Vec3::ZERO, &limits);
+            let solution = solve_planes(Vec3::ZERO, limits);
             total += solution.vector;
             if !solution.satisfied {
                 return Ok((total, false));
@@ -303,12 +367,22 @@ impl<'a> ShapeMover<'a> {
     /// # Errors
     /// If a number is not finite or out of its range.
     pub fn probe_ground(&self, world: &World, position: Vec3, reach: Real) -> Result<Option<Ground>, Error> {
+        self.probe_ground_with(world, position, reach, &mut MoverLists::default())
+    }
+
+    /// As [`ShapeMover::probe_ground`], with lists to fill.
+    pub(super) fn probe_ground_with(
+        &self,
+        world: &World,
+        position: Vec3,
+        reach: Real,
+        lists: &mut MoverLists,
+    ) -> Result<Option<Ground>, Error> {
         self.check(position)?;
         in_range("reach", reach, 0.0, 1e6)?;
-        let mut planes = Vec::new();
-        self.collect_planes(world, position, self.skin * TOUCH, &mut planes)?;
+        self.planes_at(world, position, self.skin * TOUCH, lists)?;
         let mut best: Option<ContactPlane> = None;
-        for plane in planes {
+        for &plane in &lists.planes {
             let rise = plane.normal.dot(self.up);
             if rise >= self.walkable_cosine && best.is_none_or(|best| rise > best.normal.dot(self.up)) {
                 best = Some(plane);
@@ -376,27 +450,37 @@ impl<'a> ShapeMover<'a> {
         displacement: Vec3,
         height: Real,
     ) -> Result<Option<Vec3>, Error> {
+        self.step_up_with(world, position, (displacement, height), &mut MoverLists::default())
+    }
+
+    /// As [`ShapeMover::step_up`], with lists to fill.
+    pub(super) fn step_up_with(
+        &self,
+        world: &World,
+        position: Vec3,
+        (displacement, height): (Vec3, Real),
+        lists: &mut MoverLists,
+    ) -> Result<Option<Vec3>, Error> {
         self.check(position)?;
         let rise = self.advance(world, position, self.up * max(height, SHORTEST), &[])?.0;
         let room = rise.dot(self.up);
         if room <= self.skin {
             return Ok(None);
         }
-        let ahead = self.slide(world, position + rise, displacement)?.position;
+        let ahead = self.slide_with(world, position + rise, displacement, lists)?.position;
         // The slide may have changed the height on a slope.
         let fall = max((ahead - position).dot(self.up), 0.0);
         let length = fall + SLANT * self.skin;
         let Some(hit) = self.cast(world, ahead, self.up * -length, &[])? else { return Ok(None) };
         let slant = min(1.0 / max(hit.normal.dot(self.up), 1e-3), SLANT);
         let landing = ahead - self.up * max(hit.fraction * length - self.skin * slant, 0.0);
-        let landing = self.raised(world, landing)?;
+        let landing = self.raised(world, landing, lists)?;
         // One must come to stand on it, not only against its edge: it is no higher than a step, and there is room
         // above.
         let highest = (position - self.up * (self.depth_of_foot() + self.skin)).dot(self.up) + min(height, room);
         let ahead = normalize_or(displacement, Vec3::ZERO);
-        let mut planes = Vec::new();
-        self.collect_planes(world, landing, self.skin * REACH, &mut planes)?;
-        for plane in &planes {
+        self.planes_at(world, landing, self.skin * REACH, lists)?;
+        for plane in &lists.planes {
             let rise = plane.normal.dot(self.up);
             let low = rise > 0.05 && plane.point.dot(self.up) <= highest + 0.1 * self.skin;
             if low && (rise >= self.walkable_cosine || self.top_is_walkable(world, landing, (plane.point, ahead))?) {
@@ -408,11 +492,10 @@ impl<'a> ShapeMover<'a> {
 
     /// A position raised until nothing below is closer than the skin: a cast down keeps it to what it meets first only,
     /// and to be pushed out sideways from the next edge would cost the way just made.
-    pub(super) fn raised(&self, world: &World, position: Vec3) -> Result<Vec3, Error> {
-        let mut planes = Vec::new();
-        self.collect_planes(world, position, self.skin, &mut planes)?;
+    pub(super) fn raised(&self, world: &World, position: Vec3, lists: &mut MoverLists) -> Result<Vec3, Error> {
+        self.planes_at(world, position, self.skin, lists)?;
         let mut lift: Real = 0.0;
-        for plane in &planes {
+        for plane in &lists.planes {
             let rise = plane.normal.dot(self.up);
             if rise > 0.1 {
                 lift = max((self.skin - plane.separation) / rise, lift);

@@ -203,23 +203,10 @@ impl Planes {
 mod tests {
     use super::*;
     use crate::math::normalize_or;
+    use crate::random::Random;
 
     fn limit(x: Real, y: Real, z: Real, least: Real) -> PlaneLimit {
         PlaneLimit { normal: normalize_or(Vec3::new(x, y, z), Vec3::Y), least }
-    }
-
-    /// Numbers from −1 to 1 by a multiplicative generator.
-    struct Numbers(u64);
-
-    impl Numbers {
-        fn next(&mut self) -> Real {
-            self.0 = self.0.wrapping_mul(0x5851_F42D_4C95_7F2D).wrapping_add(0x1405_7B7E_F767_814F);
-            (self.0 >> 40) as Real / 8_388_608.0 - 1.0
-        }
-
-        fn vector(&mut self) -> Vec3 {
-            Vec3::new(self.next(), self.next(), self.next())
-        }
     }
 
     #[test]
@@ -231,23 +218,23 @@ mod tests {
     /// No limit is broken, and no vector nearby that keeps them is closer: for random limits and wishes.
     #[test]
     fn solutions_keep_all_limits_and_are_closest() {
-        let mut numbers = Numbers(3);
+        let mut random = Random(3);
         for round in 0..3000 {
             let count = round % 9;
             let limits: Vec<PlaneLimit> = (0..count)
                 .map(|_| {
-                    let normal = normalize_or(numbers.vector(), Vec3::Y);
-                    PlaneLimit { normal, least: 0.2 * numbers.next() - 0.2 }
+                    let normal = normalize_or(random.vector(), Vec3::Y);
+                    PlaneLimit { normal, least: 0.2 * random.signed() - 0.2 }
                 })
                 .collect();
-            let wanted = numbers.vector();
+            let wanted = random.vector();
             let found = solve_planes(wanted, &limits);
             assert!(found.satisfied);
             for limit in &limits {
                 assert!(limit.normal.dot(found.vector) >= limit.least - 1e-6, "round {round}");
             }
             for _ in 0..50 {
-                let other = found.vector + numbers.vector() * 0.05;
+                let other = found.vector + random.vector() * 0.05;
                 let kept = limits.iter().all(|limit| limit.normal.dot(other) >= limit.least);
                 assert!(!kept || other.distance(wanted) >= found.vector.distance(wanted) - 1e-6, "round {round}");
             }
@@ -272,11 +259,11 @@ mod tests {
     /// The order of the limits does not matter.
     #[test]
     fn the_order_of_limits_does_not_matter() {
-        let mut numbers = Numbers(11);
+        let mut random = Random(11);
         for _ in 0..200 {
             let mut limits: Vec<PlaneLimit> =
-                (0..6).map(|_| PlaneLimit { normal: normalize_or(numbers.vector(), Vec3::Y), least: 0.0 }).collect();
-            let wanted = numbers.vector();
+                (0..6).map(|_| PlaneLimit { normal: normalize_or(random.vector(), Vec3::Y), least: 0.0 }).collect();
+            let wanted = random.vector();
             let forwards = solve_planes(wanted, &limits).vector;
             limits.reverse();
             assert!(solve_planes(wanted, &limits).vector.distance(forwards) < 1e-5);

@@ -7,12 +7,12 @@
 //! faces and the cross products of its edges with the segment are tried for the direction of least overlap. If the
 //! normal is (nearly) that of a face, the stretch of the segment over that face gives two points.
 
-use super::distance::{Closest, closest};
-use super::polyhedron::{CuboidFeatures, Polyhedron};
 use super::sphere::{any_perpendicular, push_rounded};
-use super::support::Support;
 use super::{Manifold, ManifoldPoint};
 use crate::math::{Pose, Real, Vec3, clamp, max, min, normalize_or};
+use crate::shape::Support;
+use crate::shape::distance::{Closest, closest};
+use crate::shape::polyhedron::{CuboidFeatures, Polyhedron};
 use crate::shape::{Capsule, ConvexHull, Cuboid};
 
 /// Segments whose angle has a sine below this are parallel: two points.

@@ -14,8 +14,8 @@ use super::mesh_points::{Candidate, Candidates, NO_FACET};
 use super::seam::{self, Bearing, Patch, Verdict};
 use super::{Manifold, ManifoldPoint, PairCache, collide_on};
 use crate::math::{Aabb, Pose, Real, Vec3, min};
-use crate::query::{Ray, cast_placed};
-use crate::shape::{Compound, Cuboid, Geometry, Shape, VoxelGrid};
+
+use crate::shape::{Compound, Cuboid, Geometry, Ray, Shape, VoxelGrid, cast_placed};
 use crate::simd::SimdLevel;
 
 /// Directions in which parts bear that are remembered.

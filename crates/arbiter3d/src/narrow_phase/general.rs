@@ -16,11 +16,11 @@
 //! Features are placed in `f64` and looked at from the touching point, so that a pebble on a hall keeps its height.
 
 use super::clip::{ClipPoint, choose_four, clip_polygon};
-use super::distance::Placed;
 use super::nearest::{Nearest, nearest};
-use super::support::Support;
 use super::{Manifold, ManifoldPoint};
 use crate::math::{Pose, Real, Vec3, clamp, max, min, tangents};
+use crate::shape::Support;
+use crate::shape::distance::Placed;
 use crate::shape::{FEATURE_POINTS, Feature, Shape};
 use glam::{DMat3, DVec3};
 

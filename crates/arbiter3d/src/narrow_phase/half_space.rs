@@ -3,9 +3,9 @@
 use super::clip::choose_four;
 use super::general::{EQUALLY_DEEP, MISSED};
 use super::mesh_points::{Candidate, Candidates, NO_FACET, position_number};
-use super::support::Support;
 use super::{Manifold, ManifoldPoint};
 use crate::math::{Pose, Real, Vec3, max, min};
+use crate::shape::Support;
 use crate::shape::{FEATURE_POINTS, Feature, Shape, Surface};
 
 /// Contacts of a half-space (shape 1) with a convex shape or a surface; nothing for others.

@@ -11,14 +11,14 @@
 //! if no triangle then reports a touch although some overlap the shape, they are looked at again and push along their faces.
 
 use super::mesh_points::{Candidate, Candidates, NO_FACET};
-use super::polyhedron::{CuboidFeatures, Polyhedron};
-use super::support::Support;
 use super::triangle::{Frame, Group, Reach, Solid};
 use super::triangle_general::General;
 use super::triangle_lanes::Near;
 use super::triangle_solid::Faceted;
 use super::{Manifold, ManifoldPoint};
 use crate::math::{Aabb, Mat3, Pose, Real, Vec3, abs3, min};
+use crate::shape::Support;
+use crate::shape::polyhedron::{CuboidFeatures, Polyhedron};
 use crate::shape::{LEAF, Leaves, MeshSides, Shape, Surface};
 use crate::simd::{LaneVec3, Lanes};
 

@@ -1,8 +1,8 @@
 //! Contacts between two shapes: which points touch, along which normal, how deep.
 //!
 //! [`collide`] sorts a pair by the kind of its shapes, so that each kernel is written once, with the more complex
-//! shape in the role of shape 1: compound, voxels, mesh, hull, cuboid, capsule, sphere. Where the caller's order is the other one, the
-//! result is mirrored.
+//! shape in the role of shape 1: compound, voxels, mesh, hull, cuboid, capsule, sphere. Where the caller's order is the
+//! other one, the result is mirrored.
 //!
 //! Every kernel keeps these laws:
 //! - all is in the frame of shape 1, so only the relative pose counts and a pair far from the origin loses no
@@ -16,9 +16,7 @@
 mod capsule;
 mod clip;
 mod composite;
-mod cores;
 mod cuboid;
-mod distance;
 mod general;
 mod half_space;
 mod hull;
@@ -27,11 +25,9 @@ mod mesh;
 mod mesh_points;
 mod nearest;
 mod penetration;
-mod polyhedron;
 mod revolved;
 mod seam;
 mod sphere;
-mod support;
 mod surfaces;
 mod time_of_impact;
 mod triangle;
@@ -39,11 +35,10 @@ mod triangle_general;
 mod triangle_lanes;
 mod triangle_solid;
 
-pub(crate) use cores::Ellipsoid;
+pub(crate) use crate::shape::Support;
+pub(crate) use crate::shape::distance::{Cast, CastPoint, closest, linear_cast};
 pub(crate) use cuboid::{CuboidLanes, CuboidPair, Near as NearCuboids, WideManifold};
-pub(crate) use distance::{Cast, CastPoint, closest, linear_cast};
 pub(crate) use seam::{Cast as SeamCast, Patch, Verdict, scale_of};
-pub(crate) use support::Support;
 pub(crate) use time_of_impact::{Approach, Sweep, Touch, approach, gap, time_of_impact};
 
 pub use manifold::{Manifold, ManifoldPoint};
@@ -190,5 +185,3 @@ mod nearest_tests;
 mod oracle_tests;
 #[cfg(test)]
 mod tests;
-#[cfg(test)]
-pub(crate) use tests::Random;

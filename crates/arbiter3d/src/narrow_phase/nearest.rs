@@ -20,9 +20,9 @@
 //! And a direction along which the cores are apart by more than is asked for ends all of this at once. What is left is
 //! searched for with `distance` and `penetration`.
 
-use super::cores::{Belt, Core, Ellipsoid, smaller};
-use super::distance::{Gap, Nearness, Placed, Settled, Simplex};
 use super::penetration::{Penetration, penetration};
+use crate::shape::cores::{Belt, Core, Ellipsoid, smaller};
+use crate::shape::distance::{Gap, Nearness, Placed, Settled, Simplex};
 use glam::{DMat3, DVec2, DVec3};
 
 /// Bounds this close, as a share of the depth, are the same.

@@ -1,11 +1,11 @@
 //! The closed forms against the searches, and shapes on which formulas break.
 
-use super::distance::{Nearness, Placed};
 use super::nearest::nearest;
-use super::support::Support;
-use super::tests::Random;
 use crate::math::{Pose, Real, Rotation, Vec3};
+use crate::random::Random;
 use crate::shape::Shape;
+use crate::shape::Support;
+use crate::shape::distance::{Nearness, Placed};
 
 /// Shapes of all kinds about as large as given, up to `thin` times as long as wide.
 fn specimens(size: Real, thin: Real, random: &mut Random) -> Vec<Shape> {

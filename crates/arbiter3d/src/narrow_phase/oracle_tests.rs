@@ -5,9 +5,9 @@
 //! axes give a bound from below; the gap along the kernel's own normal, which no direction can beat by definition unless the
 //! kernel is wrong, gives one from above.
 
-use super::tests::Random;
 use super::*;
 use crate::math::{Mat3, Vec3, max, min, tangents};
+use crate::random::Random;
 use crate::shape::{ConvexHull, ConvexShape};
 use glam::{DMat3, DVec3};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -195,7 +195,7 @@ fn polyhedron(shape: &Shape) -> Option<Solid> {
 /// What the old kernels' preference is relative to.
 fn preference(shape: &Shape) -> Real {
     let extents = shape.local_aabb().half_extents();
-    super::polyhedron::tolerance_size(shape.inner_radius(), extents.max_element())
+    crate::shape::polyhedron::tolerance_size(shape.inner_radius(), extents.max_element())
 }
 
 /// A pose with about a given gap along a random direction; a third of them square to each other.

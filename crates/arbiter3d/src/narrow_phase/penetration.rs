@@ -25,8 +25,8 @@
 //!
 //! All in `f64`, as in `distance`.
 
-use super::cores::smaller;
-use super::distance::{Gap, Placed, Settled, Simplex, larger, tangents};
+use crate::shape::cores::smaller;
+use crate::shape::distance::{Gap, Placed, Settled, Simplex, larger, tangents};
 use glam::DVec3;
 
 /// A face is on the boundary if the set reaches past it by less than this share of the size.
@@ -521,9 +521,9 @@ impl Outline {
 mod tests {
     use super::*;
     use crate::math::{Pose, Rotation, Vec3};
-    use crate::narrow_phase::distance::Nearness;
-    use crate::narrow_phase::support::Support;
-    use crate::narrow_phase::tests::Random;
+    use crate::random::Random;
+    use crate::shape::Support;
+    use crate::shape::distance::Nearness;
     use crate::shape::{Cuboid, Cylinder, Shape};
 
     fn depth(a: &Support<'_>, b: &Support<'_>, pose: &Pose) -> Option<Penetration> {
@@ -576,11 +576,11 @@ mod tests {
             overlaps += 1;
             let moved = |d: Vec3| Pose::new(pose.position + d, pose.rotation);
             let way = (found.normal * (found.depth + 1e-4)).as_vec3();
-            let out = super::super::distance::closest(&a, &b, &moved(way));
+            let out = crate::shape::distance::closest(&a, &b, &moved(way));
             assert!(out.is_some_and(|c| c.distance < 2e-4), "{round}: {found:?} {out:?}");
             for _ in 0..20 {
                 let d = random.direction() * (0.995 * found.depth as f32 - 1e-5);
-                assert!(super::super::distance::closest(&a, &b, &moved(d)).is_none_or(|c| c.distance < 1e-5));
+                assert!(crate::shape::distance::closest(&a, &b, &moved(d)).is_none_or(|c| c.distance < 1e-5));
             }
         }
         assert!(overlaps > 800, "{overlaps}");

@@ -24,7 +24,7 @@
 //! compounds and voxels alike; nothing is remembered from step to step.
 
 use crate::math::{Real, Vec3, max, min, tangents};
-use crate::query::{Ray, ShapeHit};
+use crate::shape::{Ray, ShapeHit};
 
 /// How far across the seam, and how much higher or lower counts as flat, in scales.
 const ACROSS: Real = 0.5;

@@ -5,11 +5,11 @@
 //! solid, the nearest face gives normal and depth; where `c = q` any direction square to the core is as good as
 //! another.
 
-use super::distance::closest;
-use super::polyhedron::Polyhedron;
-use super::support::Support;
 use super::{Manifold, ManifoldPoint};
 use crate::math::{Pose, Real, Vec3, clamp, normalize_or, tangents};
+use crate::shape::Support;
+use crate::shape::distance::closest;
+use crate::shape::polyhedron::Polyhedron;
 use crate::shape::{Capsule, ConvexHull, Cuboid, Sphere};
 
 /// Sphere against sphere.

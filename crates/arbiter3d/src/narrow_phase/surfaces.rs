@@ -12,8 +12,9 @@
 //!
 //! How deep is deep: a corner that is inside the other surface is pushed out by the nearest face that it can be pushed out by.
 //! Where two edges cross deep inside each other although such a face is near (the upright edge of a box and the lower edge
-//! of one that stands on it with an overhang), the crossing says nothing, and is left out. First all is looked for within a short way; only if nothing touches
-//! so, the surfaces may have run into each other, and everything up to the size of the smaller one is looked at.
+//! of one that stands on it with an overhang), the crossing says nothing, and is left out. First all is looked for
+//! within a short way; only if nothing touches so, the surfaces may have run into each other, and everything up to the
+//! size of the smaller one is looked at.
 //!
 //! Triangles of two-sided meshes push to their front here: a corner that has come through from behind has, by itself, no way to
 //! tell which side it belongs on, where a convex shape has its centre. Surfaces of which one is wholly inside the other

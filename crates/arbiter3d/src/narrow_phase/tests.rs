@@ -1,44 +1,11 @@
 //! Laws that every pair of shapes keeps, and the cuboid kernel against separating axes in `f64`.
 
-use super::polyhedron::cuboid_size;
 use super::*;
 use crate::math::{Rotation, Vec3};
+use crate::random::Random;
 use crate::shape::ConvexHull;
+use crate::shape::polyhedron::cuboid_size;
 use glam::{DMat3, DVec3};
-
-/// Numbers that repeat from run to run (Marsaglia's xorshift, 2003).
-pub(crate) struct Random(pub u64);
-
-impl Random {
-    pub fn unit(&mut self) -> Real {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 >> 40) as Real / (1u64 << 24) as Real
-    }
-
-    pub fn between(&mut self, low: Real, high: Real) -> Real {
-        low + (high - low) * self.unit()
-    }
-
-    pub fn vector(&mut self) -> Vec3 {
-        Vec3::new(self.between(-1.0, 1.0), self.between(-1.0, 1.0), self.between(-1.0, 1.0))
-    }
-
-    pub fn direction(&mut self) -> Vec3 {
-        loop {
-            let v = self.vector();
-            if v.length_squared() > 0.01 && v.length_squared() < 1.0 {
-                return v.normalize();
-            }
-        }
-    }
-
-    pub fn rotation(&mut self) -> Rotation {
-        let (v, w) = (self.vector(), self.between(-1.0, 1.0));
-        Rotation::from_xyzw(v.x, v.y, v.z, w).normalize()
-    }
-}
 
 pub(super) fn contacts(a: &Shape, b: &Shape, pose: &Pose, margin: Real) -> Manifold {
     let mut manifold = Manifold::EMPTY;
@@ -407,8 +374,8 @@ fn scaled(make: impl Fn(Real) -> Shape) -> (Shape, Shape, Shape) {
 /// Spheres and capsules against the distance of their cores, found by GJK, wherever the cores are apart.
 #[test]
 fn rounded_shapes_agree_with_the_distance_of_their_cores() {
-    use super::distance::closest;
-    use super::support::Support;
+    use crate::shape::Support;
+    use crate::shape::distance::closest;
     let mut random = Random(0x2468_1357_2468_1357);
     let rounded = [Shape::sphere(0.3).unwrap(), Shape::capsule(0.5, 0.2).unwrap()];
     let (mut checked, mut double) = (0, 0);
@@ -627,8 +594,8 @@ fn nonsense_does_not_panic() {
 /// point is theirs, and none is told for shapes that only pass each other.
 #[test]
 fn shapes_apart_tell_their_distance() {
-    use super::distance::closest;
-    use super::support::Support;
+    use crate::shape::Support;
+    use crate::shape::distance::closest;
     let mut random = Random(0x4444_3333_2222_1111);
     let all = &shapes()[..4];
     let (mut apart, mut lost, mut early, mut late) = (0, 0, 0, 0);

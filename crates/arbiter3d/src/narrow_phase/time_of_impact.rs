@@ -17,9 +17,9 @@
 //!
 //! Positions are subtracted in `f64` before they are rounded, so sweeps far from the origin lose nothing more.
 
-use super::distance::closest;
-use super::support::Support;
 use crate::math::{Pose, Real, Vec3, max, min};
+use crate::shape::Support;
+use crate::shape::distance::closest;
 use glam::DVec3;
 
 /// The time found so far is given back after this many rounds: early, never late.

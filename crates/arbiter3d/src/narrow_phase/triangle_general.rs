@@ -7,14 +7,14 @@
 //! is a neighbour's matter, or the face pushes where the surface goes on too far. Triangles without sharp edges, which are
 //! most, and those under the lowest point need no search.
 
-use super::distance::Placed;
 use super::general::{MISSED, Touch, WITNESS};
 use super::mesh_points::Candidates;
-use super::support::Support;
 use super::triangle::{Frame, Group, Reach, Solid, Triangle};
 use super::triangle_lanes::{BACKWARD, Near, Planes};
 use super::{Manifold, ManifoldPoint};
 use crate::math::{Aabb, Pose, Real, Vec3, max};
+use crate::shape::Support;
+use crate::shape::distance::Placed;
 use crate::shape::{Feature, LEAF as LANES, Surface};
 use crate::simd::Lanes;
 

@@ -9,9 +9,9 @@
 //! Lanes never mix and go through the operations of one triangle alone in the same order, so that a triangle's result does
 //! not depend on its neighbours in the group nor on the instructions that the machine has.
 
-use super::polyhedron::Polyhedron;
 use super::triangle::{Frame, Reach, Solid};
 use crate::math::{Aabb, Mat3, Real, Vec3, abs3};
+use crate::shape::polyhedron::Polyhedron;
 use crate::shape::{Facet, LEAF as LANES};
 use crate::simd::{KernelOfEight, LaneVec3, Lanes, Number, run_eight};
 

@@ -2,9 +2,9 @@
 
 use super::*;
 use crate::math::{Aabb, Pose, Rotation};
-use crate::narrow_phase::polyhedron::CuboidFeatures;
-use crate::narrow_phase::tests::Random;
 use crate::narrow_phase::triangle_lanes::Near;
+use crate::random::Random;
+use crate::shape::polyhedron::CuboidFeatures;
 use crate::shape::{ConvexHull, Cuboid, Leaves, TriangleMesh};
 use crate::simd::{LaneVec3, Lanes, Wide};
 

@@ -13,12 +13,12 @@
 //! neighbour's. Triangles without sharp edges, which are most, skip all this while the overlap is shallow.
 
 use super::mesh_points::{Candidate, Candidates};
-use super::polyhedron::Polyhedron;
 use super::triangle::{Frame, Group, Reach, Solid, Triangle, feature_id, parallel_part};
 #[cfg(test)]
 use super::triangle_lanes::BACKWARD;
 use super::triangle_lanes::{EdgeSearch, FaceSearch, Near, Overlaps, Planes, Search};
 use crate::math::{Aabb, Real, Vec3, clamp, max, max3, min, min3};
+use crate::shape::polyhedron::Polyhedron;
 use crate::shape::{Facet, LEAF as LANES, Surface};
 use crate::simd::{LaneVec3, Lanes};
 

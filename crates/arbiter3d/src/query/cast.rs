@@ -1,6 +1,6 @@
 //! Shapes that move past others: from one pose to another, until they touch.
 //!
-//! A shape that only moves along a line is cast by GJK on the moving difference (`narrow_phase::linear_cast`), one that
+//! A shape that only moves along a line is cast by GJK on the moving difference (`shape::distance::linear_cast`), one that
 //! turns as well by conservative advancement (`narrow_phase::time_of_impact`). Composites, on either side, are taken
 //! part by part.
 //!

@@ -224,7 +224,9 @@ fn visit_children<'a>(compound: &'a Compound, region: &Region, visit: &mut dyn F
 fn visit_half_space<'a>(region: &Region, visit: &mut impl FnMut(&Part<'a>, Real) -> Real) {
     let bounds = region.bounds();
     let (center, half) = (bounds.center(), bounds.half_extents());
-    let size = crate::math::min(2.0 * crate::math::max(half.max_element(), bounds.min.y.abs()) + 1.0, LARGEST_BLOCK);
+    let reach = max(half.max_element(), bounds.min.y.abs());
+    // Of a point at height zero any block will do.
+    let size = if reach > 0.0 { min(2.0 * reach, LARGEST_BLOCK) } else { 1.0 };
     let Ok(block) = Cuboid::new(Vec3::splat(size)) else { return };
     if bounds.min.y <= 0.0 || matches!(region, Region::Near { .. }) {
         let pose = Pose::from_position(Vec3::new(center.x, -size, center.z));

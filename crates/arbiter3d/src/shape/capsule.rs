@@ -1,9 +1,9 @@
 //! Capsules: a segment with a radius.
 
 use super::geometry::Geometry;
+use super::ray::{Ray, ShapeHit, cast_capsule};
 use super::{MassProperties, ShapeError, positive};
 use crate::math::{Aabb, Pose, Real, Rotation, SymmetricMat3, Vec3, abs3};
-use crate::query::{Ray, ShapeHit, cast_capsule};
 
 /// A segment on the y axis from `-half_length` to `half_length`, grown by `radius`.
 ///

@@ -7,9 +7,9 @@
 use super::geometry::Geometry;
 use super::mass::Moments;
 use super::mesh_tree::{Descent, LEAF, MeshTree, Slabs};
+use super::ray::{Ray, ShapeHit, cast_ray};
 use super::{DrawnSurface, MassProperties, Shape, ShapeError};
 use crate::math::{Aabb, Mat3, Pose, Quat, Real, Rotation, Vec3, max};
-use crate::query::{Ray, ShapeHit, cast_ray};
 use crate::simd::{LaneVec3, Lanes};
 use glam::DMat3;
 

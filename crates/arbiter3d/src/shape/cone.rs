@@ -1,11 +1,12 @@
 //! Cones along y.
 
 use super::convex::Feature;
+use super::convex_ray::cast_cone;
 use super::cylinder::rim;
 use super::geometry::Geometry;
+use super::ray::{Ray, ShapeHit};
 use super::{MassProperties, ShapeError, positive};
 use crate::math::{Aabb, Pose, Real, SymmetricMat3, Vec3};
-use crate::query::{Ray, ShapeHit, cast_cone};
 use glam::DVec3;
 
 /// A cone along y: its tip at `half_length`, its base of `radius` at `-half_length`.

@@ -1,9 +1,9 @@
 //! What the general kernels ask of convex shapes: their features, and surfaces and masses made from support points alone.
 
 use super::mass::Moments;
+use super::support::Support;
 use super::{MassProperties, ShapeError};
 use crate::math::{Real, Vec3, clamp, tangents};
-use crate::narrow_phase::Support;
 use glam::DVec3;
 
 /// Corners of a feature at most; a disc is told by as many.

@@ -1,9 +1,9 @@
 //! Boxes.
 
 use super::geometry::Geometry;
+use super::ray::{Ray, ShapeHit, cast_cuboid};
 use super::{MassProperties, ShapeError, positive};
 use crate::math::{Aabb, Pose, Real, SymmetricMat3, Vec3, abs3, rotated_half_extents};
-use crate::query::{Ray, ShapeHit, cast_cuboid};
 
 /// A box about the origin of its frame.
 ///

@@ -1,12 +1,13 @@
 //! Convex shapes of the user's own, told by a support function and a centre.
 
 use super::convex::{Feature, mass_of_support, sampled_feature, sphere_grid};
+use super::convex_ray::cast_support;
 use super::geometry::Geometry;
 use super::inside::Inside;
+use super::ray::{Ray, ShapeHit};
+use super::support::Support;
 use super::{MassProperties, ShapeError};
 use crate::math::{Aabb, Pose, Real, Vec3, max, min};
-use crate::narrow_phase::Support;
-use crate::query::{Ray, ShapeHit, cast_support};
 use glam::DVec3;
 use std::fmt::Debug;
 use std::sync::OnceLock;

@@ -1,10 +1,11 @@
 //! Cylinders along y.
 
 use super::convex::Feature;
+use super::convex_ray::cast_cylinder;
 use super::geometry::Geometry;
+use super::ray::{Ray, ShapeHit};
 use super::{MassProperties, ShapeError, positive};
 use crate::math::{Aabb, Pose, Real, SymmetricMat3, Vec3, abs3, min};
-use crate::query::{Ray, ShapeHit, cast_cylinder};
 use glam::DVec3;
 
 /// A cylinder along y about the origin.

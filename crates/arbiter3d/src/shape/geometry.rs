@@ -4,9 +4,9 @@
 //! its `geometry`. A convex one also has a variant in the narrow phase's `Support`, which is all that contacts and queries
 //! need; a composite one has an arm where convex parts are listed.
 
+use super::ray::{Ray, ShapeHit};
 use super::{MassProperties, ShapeError};
 use crate::math::{Aabb, Pose, Real, Vec3};
-use crate::query::{Ray, ShapeHit};
 
 /// What the world, the queries and the tools ask of a shape, in its own frame.
 pub(crate) trait Geometry {

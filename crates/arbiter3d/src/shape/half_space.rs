@@ -1,9 +1,9 @@
 //! Half-spaces: endless floors.
 
 use super::geometry::Geometry;
+use super::ray::{Ray, ShapeHit};
 use super::{MassProperties, ShapeError};
 use crate::math::{Aabb, Pose, Real, Vec3};
-use crate::query::{Ray, ShapeHit};
 
 /// Everything with `y ≤ 0`: an endless floor, for static and kinematic bodies. Turn the shape for other directions.
 ///

@@ -26,9 +26,9 @@ use super::hull_builder::{Lattice, TriangulatedHull};
 use super::hull_core::eroded_corners;
 use super::hull_features::{HullFeatures, LANES};
 use super::hull_merge::{Outline, simplify, triangles_as_outlines};
+use super::ray::{Ray, ShapeHit, cast_planes};
 use super::{MassProperties, ShapeError, positive};
 use crate::math::{Aabb, Pose, Real, SymmetricMat3, Vec3, max};
-use crate::query::{Ray, ShapeHit, cast_planes};
 use glam::DVec3;
 use std::collections::BTreeMap;
 

@@ -1,11 +1,11 @@
 //! The core of a hull: its corners drawn inwards, for continuous collision.
 //!
-//! With the planes `n · x ≤ d` of the hull, the points that are at least `t` inside are `n · x ≤ d − t`. That set is convex, so
-//! the hull of any points in it is in it. For each corner a point of it near the corner is taken: cyclic projection onto
-//! the planes moved inwards that it is beyond (Kaczmarz' method, 1937), which for a box ends at the corner of the smaller box
-//! at once, and for a long tip comes close. What is still outside after some rounds is drawn towards the middle, which lies
-//! inside by more than `t`, until it is in. So a long thin hull keeps its length, where a copy scaled about the middle would
-//! lose half of it.
+//! With the planes `n · x ≤ d` of the hull, the points that are at least `t` inside are `n · x ≤ d − t`. That set is
+//! convex, so the hull of any points in it is in it. For each corner a point of it near the corner is taken: cyclic
+//! projection onto the planes moved inwards that it is beyond (Kaczmarz' method, 1937), which for a box ends at the
+//! corner of the smaller box at once, and for a long tip comes close. What is still outside after some rounds is drawn
+//! towards the middle, which lies inside by more than `t`, until it is in. So a long thin hull keeps its length, where
+//! a copy scaled about the middle would lose half of it.
 
 use super::Plane;
 use crate::math::{Real, Vec3, max};
@@ -43,6 +43,7 @@ pub(super) fn eroded_corners(corners: &[Vec3], planes: &[Plane], middle: Vec3, t
 mod tests {
     use crate::ConvexHull;
     use crate::math::{Real, Vec3};
+    use crate::random::Random;
 
     /// A rod of 2 m and 2 cm keeps its length but for half a centimetre at each end; each corner goes in by that much.
     #[test]
@@ -58,14 +59,10 @@ mod tests {
     /// Cores of random hulls, slivers among them, are inside by half the inner radius, and no corner goes past the middle.
     #[test]
     fn cores_are_inside_by_half_the_inner_radius() {
-        let mut state = 7_u32;
-        let mut next = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 8) as Real / 16_777_216.0 - 0.5
-        };
+        let mut random = Random(7);
         for round in 0..200 {
             let flat = if round % 2 == 0 { 1.0 } else { 0.05 };
-            let points: Vec<Vec3> = (0..20).map(|_| Vec3::new(next(), next() * flat, next())).collect();
+            let points: Vec<Vec3> = (0..20).map(|_| random.vector() * Vec3::new(0.5, 0.5 * flat, 0.5)).collect();
             let hull = ConvexHull::new(&points).unwrap();
             let (thickness, middle) = (0.5 * hull.inner_radius(), hull.centroid());
             for ((corner, core), spine) in hull.vertices().iter().zip(hull.core()).zip(hull.spine()) {

@@ -2,8 +2,8 @@
 
 use super::ConvexHull;
 use super::convex::sphere_grid;
+use super::support::Support;
 use crate::math::{Real, Vec3};
-use crate::narrow_phase::Support;
 use glam::DVec3;
 
 /// Corners of the hull at most: continuous collision looks at all of them again and again.

@@ -209,7 +209,7 @@ mod tests {
             let far = 1.5 * size.y as Real;
             let cast = |from: Real, way: Real| {
                 let origin = Vec3::new(x as Real, from, z as Real);
-                let ray = crate::query::Ray { origin, direction: Vec3::Y * way, max_fraction: 1.0 };
+                let ray = crate::shape::Ray { origin, direction: Vec3::Y * way, max_fraction: 1.0 };
                 shape.geometry().cast_ray(&ray).map(|hit| f64::from(from + way * hit.fraction))
             };
             let (Some(top), Some(bottom)) =
@@ -315,7 +315,7 @@ mod tests {
         for core in [Shape::cuboid(Vec3::new(0.3, 0.5, 0.7)), Shape::cylinder(0.6, 0.3)] {
             let rounded = Shape::rounded(&core.unwrap(), 0.2).unwrap();
             let found = rounded.mass_properties(1.0).unwrap();
-            let sampled = super::super::convex::mass_of_support(&crate::narrow_phase::Support::new(&rounded).unwrap());
+            let sampled = super::super::convex::mass_of_support(&crate::shape::Support::new(&rounded).unwrap());
             let sampled = sampled.unwrap();
             let near = |x: Real, y: Real| assert!((x - y).abs() < 3e-4 * y, "{x} {y}");
             near(found.mass, sampled.mass);

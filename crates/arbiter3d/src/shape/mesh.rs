@@ -9,10 +9,10 @@ use super::mesh_core::InnerShell;
 use super::mesh_edges::{Adjacency, Surface, Surroundings};
 use super::mesh_interior::Interior;
 use super::mesh_tree::{Descent, LEAF, Leaves, MeshTree};
+use super::ray::{Ray, ShapeHit};
 use super::surface_ray::first_triangle;
 use super::{MassProperties, ShapeError};
 use crate::math::{Aabb, Real, Vec3, max3, min3};
-use crate::query::{self, ShapeHit};
 use crate::simd::{LaneVec3, Lanes, Quad};
 use glam::DVec3;
 use std::sync::OnceLock;
@@ -406,7 +406,7 @@ impl Geometry for TriangleMesh {
         self.interior().map_or((self.local_aabb().center(), 0.0), |interior| interior.ball)
     }
 
-    fn cast_ray(&self, ray: &query::Ray) -> Option<ShapeHit> {
+    fn cast_ray(&self, ray: &Ray) -> Option<ShapeHit> {
         let hit = self.cast_ray(ray.origin, ray.direction, ray.max_fraction)?;
         Some(ShapeHit { fraction: hit.distance, normal: hit.normal })
     }

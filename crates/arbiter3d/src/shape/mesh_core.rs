@@ -8,11 +8,12 @@
 //! Where a triangle of the shell crosses the mesh, as it may where a cavity is near a large face, its corners are drawn back
 //! to half their way, again and again, and to the surface in the end.
 
+use super::distance::closest;
 use super::mesh::{MeshSides, TriangleMesh};
+use super::support::Support;
 use super::surface::Surface;
 use super::surface_ray::first_triangle;
 use crate::math::{Aabb, Pose, Real, Vec3, max, min, normalize_or};
-use crate::narrow_phase::{Support, closest};
 use std::cmp::Ordering;
 
 /// Share of the way through the mesh at which a point is.

@@ -2,20 +2,7 @@
 
 use super::super::mesh_edges::EdgeKind;
 use super::*;
-
-/// Numbers from a linear congruential generator, in `[-1, 1)`.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> Real {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        ((self.0 >> 40) as Real) / 8_388_608.0 - 1.0
-    }
-
-    fn vector(&mut self) -> Vec3 {
-        Vec3::new(self.next(), self.next(), self.next())
-    }
-}
+use crate::random::Random;
 
 fn soup(random: &mut Random, count: usize, sides: MeshSides) -> TriangleMesh {
     let mut vertices = Vec::new();
@@ -88,7 +75,7 @@ fn rays_do_not_slip_through_seams() {
         if vertex.x <= 0.0 || vertex.z <= 0.0 || vertex.x >= 20.0 || vertex.z >= 20.0 {
             continue;
         }
-        let tilt = Vec3::new(0.3 * random.next(), -1.0, 0.3 * random.next());
+        let tilt = Vec3::new(0.3 * random.signed(), -1.0, 0.3 * random.signed());
         let above = vertex - tilt * 5.0;
         let hit = mesh.cast_ray(above, vertex - above, 2.0).expect("a ray slipped through at a vertex");
         assert!((hit.distance - 1.0).abs() < 0.05 && hit.normal.y > 0.5);
@@ -100,7 +87,7 @@ fn bumpy_floor(cells: u32) -> TriangleMesh {
     let mut random = Random(3);
     let side = cells + 1;
     let vertices =
-        (0..side * side).map(|i| Vec3::new((i % side) as Real, 0.1 * random.next(), (i / side) as Real)).collect();
+        (0..side * side).map(|i| Vec3::new((i % side) as Real, 0.1 * random.signed(), (i / side) as Real)).collect();
     let mut triangles = Vec::new();
     for cell in 0..cells * cells {
         let i = cell / cells * side + cell % cells;

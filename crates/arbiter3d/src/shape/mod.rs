@@ -13,11 +13,14 @@ mod capsule;
 mod compound;
 mod cone;
 mod convex;
+mod convex_ray;
+pub(crate) mod cores;
 mod cuboid;
 mod custom;
 mod cylinder;
 #[cfg(feature = "decomposition")]
 mod decomposition;
+pub(crate) mod distance;
 mod geometry;
 mod half_space;
 mod height_field;
@@ -35,8 +38,11 @@ mod mesh_interior;
 mod mesh_tree;
 mod mesh_tree_builder;
 mod point_cloud;
+pub(crate) mod polyhedron;
+mod ray;
 mod rounded;
 mod sphere;
+mod support;
 mod surface;
 mod surface_ray;
 mod tapered_capsule;
@@ -69,8 +75,11 @@ pub(crate) use mesh_edges::Surroundings;
 pub(crate) use mesh_interior::distance_squared;
 pub(crate) use mesh_tree::{Descent, LEAF, Leaves, Slabs, box_distances};
 pub use point_cloud::PointCloud;
+pub(crate) use ray::cast_placed;
+pub use ray::{Ray, ShapeHit, cast_ray};
 pub use rounded::Rounded;
 pub use sphere::Sphere;
+pub(crate) use support::Support;
 pub(crate) use surface::Surface;
 pub use tapered_capsule::TaperedCapsule;
 pub use transformed::Transformed;
@@ -79,7 +88,6 @@ pub(crate) use triangle::{triangle_edge, triangle_feature};
 pub use voxels::VoxelGrid;
 
 use crate::math::{Aabb, Mat3, Pose, Real, Vec3};
-use crate::narrow_phase::Support;
 use std::sync::Arc;
 
 /// Why a shape cannot be built. Each message names the argument or the element.
@@ -606,8 +614,8 @@ impl Shape {
 
     /// Corners and triangles of the surface, for drawing and exporting; the triangles wind counter-clockwise from outside.
     ///
-    /// Cuboids, hulls, meshes and height fields as they are; other convex shapes through about `4 steps²` points of their surface, at least
-    /// one step, at most 64. A half-space gives a square of 200 m.
+    /// Cuboids, hulls, meshes and height fields as they are; other convex shapes through about `4 steps²` points of
+    /// their surface, at least one step, at most 64. A half-space gives a square of 200 m.
     ///
     /// ```
     /// use arbiter3d::Shape;

@@ -6,12 +6,13 @@
 //! corners.
 
 use super::convex::{FEATURE_POINTS, FLAT_SINE, Feature, sampled_feature, sphere_grid};
+use super::convex_ray::cast_support;
 use super::geometry::Geometry;
 use super::inside::Inside;
+use super::ray::{Ray, ShapeHit};
+use super::support::Support;
 use super::{ConvexHull, MassProperties, ShapeError};
 use crate::math::{Aabb, Pose, Real, Vec3, max, tangents};
-use crate::narrow_phase::Support;
-use crate::query::{Ray, ShapeHit, cast_support};
 use glam::DVec3;
 
 /// The shrink-wrap of points: everything between them.

@@ -1,11 +1,12 @@
 //! Convex shapes grown by a radius: rounded boxes, hulls, cylinders.
 
 use super::convex::{Feature, mass_of_support};
+use super::convex_ray::cast_support;
 use super::geometry::Geometry;
+use super::ray::{Ray, ShapeHit};
+use super::support::Support;
 use super::{MassProperties, Shape, ShapeError, positive};
 use crate::math::{Aabb, Pose, Real, SymmetricMat3, Vec3};
-use crate::narrow_phase::Support;
-use crate::query::{Ray, ShapeHit, cast_support};
 use glam::DVec3;
 
 /// A convex shape grown by a radius on all sides.
@@ -107,8 +108,8 @@ fn mass_of_cuboid(half: DVec3, r: f64) -> MassProperties {
     symmetric(volume, [square(a, b, c), square(b, c, a), square(c, a, b)])
 }
 
-/// A solid of revolution about y: within the half length `h` its radius is `R + r`, beyond `R + s` with `s² = r² − t²`, `t` the
-/// way beyond. The integrals of powers of `s` from `t = 0` to `r`, alone, times `t` and times `t²`, are known.
+/// A solid of revolution about y: within the half length `h` its radius is `R + r`, beyond `R + s` with `s² = r² − t²`,
+/// `t` the way beyond. The integrals of powers of `s` from `t = 0` to `r`, alone, times `t` and times `t²`, are known.
 fn mass_of_cylinder(half_length: Real, core_radius: Real, radius: Real) -> MassProperties {
     const PI: f64 = std::f64::consts::PI;
     let [h, core, r] = [half_length, core_radius, radius].map(f64::from);

@@ -1,9 +1,9 @@
 //! Spheres.
 
 use super::geometry::Geometry;
+use super::ray::{Ray, ShapeHit, cast_sphere};
 use super::{MassProperties, ShapeError, positive};
 use crate::math::{Aabb, Pose, Real, SymmetricMat3, Vec3};
-use crate::query::{Ray, ShapeHit, cast_sphere};
 
 /// A ball about the origin of its frame.
 ///

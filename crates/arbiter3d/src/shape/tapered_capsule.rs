@@ -1,12 +1,13 @@
 //! Tapered capsules: the convex hull of two balls.
 
 use super::convex::{FLAT_SINE, Feature};
+use super::convex_ray::cast_support;
 use super::geometry::Geometry;
 use super::mass::{RevolvedPiece, mass_of_revolution};
+use super::ray::{Ray, ShapeHit};
+use super::support::Support;
 use super::{MassProperties, ShapeError, positive};
 use crate::math::{Aabb, Pose, Real, Vec3, max};
-use crate::narrow_phase::Support;
-use crate::query::{Ray, ShapeHit, cast_support};
 use glam::DVec3;
 
 /// The convex hull of a ball of `top_radius` at `half_length` on y and one of `bottom_radius` at `-half_length`.

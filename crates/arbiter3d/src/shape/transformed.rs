@@ -4,13 +4,14 @@
 //! map of `S`. Rays are taken back by the inverse, which keeps fractions; moments are mapped exactly.
 
 use super::convex::Feature;
+use super::cores::Ellipsoid;
 use super::geometry::Geometry;
 use super::inside::Inside;
 use super::mass::Moments;
+use super::ray::{Ray, ShapeHit, cast_ray};
+use super::support::Support;
 use super::{MassProperties, Shape, ShapeError};
 use crate::math::{Aabb, Mat3, Pose, Real, Vec3, max, max3, min3};
-use crate::narrow_phase::{Ellipsoid, Support};
-use crate::query::{Ray, ShapeHit, cast_ray};
 use glam::{DMat3, DVec3};
 use std::sync::OnceLock;
 

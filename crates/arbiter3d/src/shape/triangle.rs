@@ -1,11 +1,12 @@
 //! Single triangles.
 
 use super::convex::Feature;
+use super::convex_ray::cast_support;
 use super::geometry::Geometry;
+use super::ray::{Ray, ShapeHit};
+use super::support::Support;
 use super::{MassProperties, ShapeError};
 use crate::math::{Aabb, Pose, Real, Vec3, max};
-use crate::narrow_phase::Support;
-use crate::query::{Ray, ShapeHit, cast_support};
 
 /// One triangle, solid from both sides: a sail, a ramp, a test.
 ///

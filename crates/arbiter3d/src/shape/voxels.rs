@@ -13,9 +13,9 @@
 use super::compound::moments_of_box;
 use super::geometry::Geometry;
 use super::mass::Moments;
+use super::ray::{Ray, ShapeHit};
 use super::{Cuboid, DrawnSurface, MassProperties, ShapeError, positive};
 use crate::math::{Aabb, Real, Vec3, max};
-use crate::query::{Ray, ShapeHit};
 use glam::DVec3;
 use std::collections::BTreeMap;
 use std::sync::Arc;

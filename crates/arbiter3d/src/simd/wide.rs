@@ -2,8 +2,8 @@
 //!
 //! A kernel is written once over a type `W` that stands for `L` numbers side by side. [`Number`] is its arithmetic, [`Lanes`]
 //! the way in and out. The plain array [`Wide`] serves every machine; x86-64 has register types of its own (see `x86`), since
-//! compilers turn loops over arrays into such instructions only in part: 100 steps of a large pyramid took 0.80 s with arrays, 0.47
-//! with registers.
+//! compilers turn loops over arrays into such instructions only in part: 100 steps of a large pyramid took 0.80 s with
+//! arrays, 0.47 with registers.
 
 use std::array::from_fn;
 use std::fmt::Debug;

@@ -357,6 +357,7 @@ fn static_color(rows: &mut u8) -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Random;
 
     /// Colours rows of arbiters between these bodies, of which those from `first_fixed` on do not move; each arbiter has the
     /// rows that `rows` packs.
@@ -416,15 +417,11 @@ mod tests {
     /// 3,000 arbiters of two rows between 400 bodies, a fifth of which do not move: no colour has two rows of a body.
     #[test]
     fn rows_of_a_color_share_no_body_that_moves() {
-        let mut state = 7_u64;
-        let mut below = |end: u32| {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 33) as u32 % end
-        };
+        let mut random = Random(7);
         let ties: Vec<[u32; 2]> = (0..3000)
             .map(|_| {
-                let a = below(320);
-                [a, (a + 1 + below(399)) % 400]
+                let a = random.below(320);
+                [a, (a + 1 + random.below(399)) % 400]
             })
             .collect();
         let plan = plan_of(&ties, 320, 0b1010_0001);

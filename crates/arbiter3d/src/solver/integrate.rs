@@ -325,8 +325,8 @@ impl<W: Number> Spinning<W> {
         (select(gained, &angular_velocity, &mean), select(gained, &angular_velocity, &end))
     }
 
-    /// Angular velocity that has the momentum in another orientation: `ω' = ω + I'⁻¹ (L − I' ω)` rather than `I'⁻¹ L`, so
-    /// that rounding errs by a share of the change, not of the whole.
+    /// Angular velocity that has the momentum in another orientation: `ω' = ω + I'⁻¹ (L − I' ω)` rather than `I'⁻¹ L`,
+    /// so that rounding errs by a share of the change, not of the whole.
     #[inline(always)]
     fn at(&self, q: &LaneRotation<W>, angular_velocity: &LaneVec3<W>, momentum: &LaneVec3<W>) -> LaneVec3<W> {
         let missing = *momentum - through(q, &self.inertia, angular_velocity);

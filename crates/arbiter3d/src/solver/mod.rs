@@ -14,4 +14,4 @@ pub(crate) use coloring::{RowPart, RowPlan};
 pub(crate) use integrate::{IntegrateParameters, IntegrateTarget, Integration};
 pub(crate) use lanes::{ContactSolver, Pass, StoreTarget, contact_solver};
 pub(crate) use prepare::PrepareContext;
-pub(crate) use solve::{PassParameters, Softness};
+pub(crate) use solve::{PassParameters, Softness, SquareScale};

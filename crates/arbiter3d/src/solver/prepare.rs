@@ -1,8 +1,9 @@
 //! From arbiters to wide rows, and back.
 //!
-//! Records of contacts and bodies are transposed into lanes ([`Instructions::load`]), then all lanes compute together. With `q₁, q₂` the rotations and
-//! `c₁, c₂` the centres of mass, a point has the gap `n · ((c₂ + q₂ anchor₂) − (c₁ + q₁ anchor₁))`, levers `rₖ` (the anchors
-//! as they were turned when the manifold was made), and the response between points `i` and `j`
+//! Records of contacts and bodies are transposed into lanes ([`Instructions::load`]), then all lanes compute together.
+//! With `q₁, q₂` the rotations and `c₁, c₂` the centres of mass, a point has the gap `n · ((c₂ + q₂ anchor₂) − (c₁ + q₁
+//! anchor₁))`, levers `rₖ` (the anchors as they were turned when the manifold was made), and the response between
+//! points `i` and `j`
 //!
 //! ```text
 //! Aᵢⱼ = n·(M₁⁻¹ + M₂⁻¹)n + (r₁ⱼ×n)·I₁⁻¹(r₁ᵢ×n) + (r₂ⱼ×n)·I₂⁻¹(r₂ᵢ×n)

@@ -1,10 +1,10 @@
 //! Wide rows: `L` contact manifolds side by side, each with up to `P` points on one normal.
 //!
-//! Both levers of a point end at the same place but for its gap, which lies along the normal: `r₂ × n` and `r₁ × n` differ by
-//! the same vector for all points of a row, its *offset*. So a point stores `a = r₁ × n` alone; its normal velocity is
-//! `n·(v₂ − v₁) + offset·ω₂ + a·(ω₂ − ω₁)`, and its separation to first order the same expression with the displacements of
-//! the step. (Points that users register may have drifted apart sideways, by up to the break distance: their row takes the
-//! mean offset.)
+//! Both levers of a point end at the same place but for its gap, which lies along the normal: `r₂ × n` and `r₁ × n`
+//! differ by the same vector for all points of a row, its *offset*. So a point stores `a = r₁ × n` alone; its normal
+//! velocity is `n·(v₂ − v₁) + offset·ω₂ + a·(ω₂ − ω₁)`, and its separation to first order the same expression with the
+//! displacements of the step. (Points that users register may have drifted apart sideways, by up to the break distance:
+//! their row takes the mean offset.)
 //!
 //! The points of a row are solved one after the other (Gauss–Seidel), but in the space of their normal velocities: `coupling`
 //! holds how much an impulse at point `i` changes the normal velocity at point `j`, so the bodies are read and written once a

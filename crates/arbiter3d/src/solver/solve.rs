@@ -55,6 +55,27 @@ pub(crate) struct PassParameters {
     pub deepest_rest: Real,
     pub softness: Softness,
     pub restitution_threshold: Real,
+    pub squares: SquareScale,
+}
+
+/// Powers of two that bring impulses near one before they are squared, by the length unit of the world. A world of
+/// millimetres has impulses of 10⁻¹² N s (mass by the cube of the length, speed by the length) and angular ones of
+/// 10⁻¹⁵ N m s, whose squares fall out of single precision where friction is weak. Powers of two change no other bit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct SquareScale {
+    pub linear: Real,
+    pub angular: Real,
+}
+
+impl SquareScale {
+    /// For lengths of about `length_unit`, from 10⁻⁶ to 10⁶.
+    pub fn new(length_unit: Real) -> Self {
+        /// The bits of the exponent alone: the largest power of two that is no larger.
+        const EXPONENT: u32 = 0x7f80_0000;
+        let unit = Real::from_bits(length_unit.to_bits() & EXPONENT);
+        let squared = unit * unit;
+        Self { linear: 1.0 / (squared * squared), angular: 1.0 / (squared * squared * unit) }
+    }
 }
 
 /// A wide row as a pass sees it.
@@ -132,10 +153,10 @@ impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> RowPass<'_, W,
             twist_load += impulse * self.friction.levers[i];
         }
         if self.features.rolling {
-            self.solve_rolling(load, &mut sides);
+            self.solve_rolling(load, &mut sides, pass);
         }
         self.solve_twist(twist_load, &mut sides);
-        self.solve_tangents(load, &mut sides);
+        self.solve_tangents(load, &mut sides, pass);
         // SAFETY: promised by the caller.
         unsafe { self.scatter(&sides) };
     }
@@ -269,12 +290,14 @@ impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> RowPass<'_, W,
 
     /// Rolling resistance: a torque against the relative spin, limited by the load.
     #[inline(always)]
-    fn solve_rolling(&mut self, load: W, sides: &mut Sides<W>) {
+    fn solve_rolling(&mut self, load: W, sides: &mut Sides<W>, pass: &PassParameters) {
         let Some(extra) = &mut self.extra else { return };
         let response = self.row.inverse_inertia1.add(&self.row.inverse_inertia2);
         let old = extra.rolling_impulse;
         let wanted = old - response.solve(&(sides.v2.angular - sides.v1.angular));
-        let new = wanted.scale(cone_scale(wanted.dot(&wanted), extra.rolling_resistance * load));
+        let near_one = W::splat(pass.squares.angular);
+        let (length, limit) = (wanted.scale(near_one), extra.rolling_resistance * load * near_one);
+        let new = wanted.scale(cone_scale(length.dot(&length), limit));
         extra.rolling_impulse = new;
         self.apply_torque(&(new - old), sides);
     }
@@ -295,7 +318,7 @@ impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> RowPass<'_, W,
 
     /// Friction against sliding: both tangents at once, inside the circle of the cone.
     #[inline(always)]
-    fn solve_tangents(&mut self, load: W, sides: &mut Sides<W>) {
+    fn solve_tangents(&mut self, load: W, sides: &mut Sides<W>, pass: &PassParameters) {
         let tangents = Tangents::of(self.row, self.friction);
         let friction = &mut *self.friction;
         let slide = sides.v2.linear - sides.v1.linear + sides.v2.angular.cross(&friction.lever2)
@@ -307,15 +330,17 @@ impl<W: Lanes<L>, const L: usize, const P: usize, const C: usize> RowPass<'_, W,
         let (old1, old2) = (friction.impulse1, friction.impulse2);
         let wanted1 = old1 - (friction.mass11 * slip1 + friction.mass12 * slip2);
         let wanted2 = old2 - (friction.mass12 * slip1 + friction.mass22 * slip2);
-        let scale = cone_scale(wanted1 * wanted1 + wanted2 * wanted2, friction.friction * load);
+        let near_one = W::splat(pass.squares.linear);
+        let (w1, w2, limit) = (wanted1 * near_one, wanted2 * near_one, friction.friction * load * near_one);
+        let scale = cone_scale(w1 * w1 + w2 * w2, limit);
         (friction.impulse1, friction.impulse2) = (wanted1 * scale, wanted2 * scale);
         if let Some(extra) = &self.extra
             && self.features.anisotropic
         {
-            let limit = friction.friction * load;
-            let (on1, on2) = on_ellipse(friction, [wanted1, wanted2], extra.ratio, limit);
-            friction.impulse1 = extra.ratio.if_positive(on1, friction.impulse1);
-            friction.impulse2 = extra.ratio.if_positive(on2, friction.impulse2);
+            let (on1, on2) = on_ellipse(friction, [w1, w2], extra.ratio, limit);
+            let back = W::splat(1.0 / pass.squares.linear);
+            friction.impulse1 = extra.ratio.if_positive(on1 * back, friction.impulse1);
+            friction.impulse2 = extra.ratio.if_positive(on2 * back, friction.impulse2);
         }
         let change = [friction.impulse1 - old1, friction.impulse2 - old2];
         self.apply_friction(&tangents, change, sides);

@@ -38,7 +38,8 @@ pub(crate) struct Body {
     pub awake_place: u32,
     /// Sleeping island the body belongs to.
     pub island: u32,
-    /// Smallest ball inside its shapes (of what is made of parts, its thinnest part), and the farthest a point of it is from the centre of mass.
+    /// Smallest ball inside its shapes (of what is made of parts, its thinnest part), and the farthest a point of it is
+    /// from the centre of mass.
     pub inner_radius: Real,
     pub reach: Real,
     /// Half the size of the smallest box about the centre of mass that holds its shapes, in its axes.

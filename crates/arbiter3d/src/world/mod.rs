@@ -125,8 +125,10 @@ pub struct World {
     index_scratch: Vec<u32>,
     /// Where fast bodies stop.
     stops: Vec<Option<continuous::Held>>,
-    /// Kinematic bodies, sorted; and their shapes on their ways, while fast bodies are looked at.
+    /// Kinematic bodies, sorted, and those of them that are awake; and their shapes on their ways, while fast bodies are
+    /// looked at.
     kinematic: Vec<u32>,
+    awake_kinematic: Vec<u32>,
     /// Bullets, sorted; and what their flight needs.
     bullets: Vec<u32>,
     flight: continuous::FlightScratch,
@@ -211,6 +213,7 @@ impl World {
             index_scratch: Vec::new(),
             stops: Vec::new(),
             kinematic: Vec::new(),
+            awake_kinematic: Vec::new(),
             bullets: Vec::new(),
             flight: continuous::FlightScratch::default(),
             impacts: Vec::new(),
@@ -450,13 +453,9 @@ impl World {
         let body = &self.bodies[index as usize];
         let kinematic = body.alive && body.kind == BodyKind::Kinematic;
         let bullet = body.alive && body.bullet;
-        for (list, listed) in [(&mut self.kinematic, kinematic), (&mut self.bullets, bullet)] {
-            match list.binary_search(&index) {
-                Ok(at) if !listed => drop(list.remove(at)),
-                Err(at) if listed => list.insert(at, index),
-                _ => {}
-            }
-        }
+        list_body(&mut self.kinematic, index, kinematic);
+        list_body(&mut self.bullets, index, bullet);
+        storage::reserve(&mut self.awake_kinematic, self.kinematic.len());
     }
 
     fn change_kind(&mut self, index: u32, kind: BodyKind) {
@@ -510,6 +509,18 @@ impl World {
             }
         }
         Ok(())
+    }
+}
+
+/// Keeps a body in a sorted list, or out of it.
+fn list_body(list: &mut Vec<u32>, index: u32, listed: bool) {
+    match list.binary_search(&index) {
+        Ok(at) if !listed => drop(list.remove(at)),
+        Err(at) if listed => {
+            storage::reserve(list, list.len() + 1);
+            list.insert(at, index);
+        }
+        _ => {}
     }
 }
 

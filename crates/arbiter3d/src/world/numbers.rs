@@ -79,8 +79,8 @@ impl World {
         self.bodies.iter().enumerate().filter(|(_, body)| body.alive && body.enabled && body.is_dynamic())
     }
 
-    /// A number that two worlds share exactly when (but for one chance in 2⁶⁴) all poses, velocities, rest times, contacts and
-    /// impulses are the same bits.
+    /// A number that two worlds share exactly when (but for one chance in 2⁶⁴) all poses, velocities, rest times,
+    /// contacts and impulses are the same bits.
     #[must_use]
     pub fn hash(&self) -> u64 {
         let mut hash = StateHash(0xcbf2_9ce4_8422_2325);

@@ -478,16 +478,16 @@ impl World {
 #[cfg(test)]
 mod tests {
     use super::PlaceSet;
+    use crate::random::Random;
     use std::collections::BTreeSet;
 
     /// 2,000 random edits over 300 places: bits and count are those of a sorted set, however often a place comes and goes.
     #[test]
     fn places_are_those_of_a_set_whatever_came_and_went() {
         let (mut set, mut model) = (PlaceSet::default(), BTreeSet::new());
-        let mut state = 3_u64;
+        let mut random = Random(3);
         for edit in 0..2_000 {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            let place = (state >> 33) as u32 % 300;
+            let place = random.below(300);
             if model.remove(&place) {
                 set.remove(place);
             } else {

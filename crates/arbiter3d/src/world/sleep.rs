@@ -4,8 +4,8 @@
 //! `time_to_sleep`, the island sleeps: its bodies leave the list of awake ones, and with them go the pairs and arbiters that
 //! no awake body has. A sleeping body costs a step nothing.
 
-use super::World;
 use super::definition::BodyKind;
+use super::{World, list_body};
 use crate::arbiter::NONE;
 use crate::math::Vec3;
 
@@ -73,6 +73,9 @@ impl World {
         body.awake_place = place;
         self.awake_changed = true;
         self.awake.push(index);
+        if self.bodies[index as usize].kind == BodyKind::Kinematic {
+            list_body(&mut self.awake_kinematic, index, true);
+        }
         let mut edges = std::mem::take(&mut self.index_scratch);
         edges.extend(self.pairs_of_body(index));
         for pair in edges.drain(..) {
@@ -93,9 +96,12 @@ impl World {
         }
         body.awake = false;
         self.awake_changed = true;
+        if body.kind == BodyKind::Kinematic {
+            list_body(&mut self.awake_kinematic, index, false);
+        }
         let state = &mut self.solver_bodies.states[index as usize];
         (state.translation, state.turn) = (Vec3::ZERO, Vec3::ZERO);
-        let place = std::mem::replace(&mut body.awake_place, NONE);
+        let place = std::mem::replace(&mut self.bodies[index as usize].awake_place, NONE);
         self.awake.swap_remove(place as usize);
         if let Some(&moved) = self.awake.get(place as usize) {
             self.bodies[moved as usize].awake_place = place;

@@ -14,7 +14,7 @@ use crate::math::{Aabb, Pose, Real, Vec3, min};
 use crate::parallel::{BlockList, Gather, SharedSlice};
 use crate::solver::{
     BodyMass, BodyMotion, BodyState, IntegrateParameters, IntegrateTarget, Integration, Pass, PassParameters,
-    PrepareContext, RowPart, Softness, StoreTarget,
+    PrepareContext, RowPart, Softness, SquareScale, StoreTarget,
 };
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -64,6 +64,8 @@ pub struct StepReport {
 enum BodyNews {
     /// The body may have passed through something.
     Fast(FastBody),
+    /// The body may have if it is a kinematic one at rest; how far its points have come at most.
+    Passing(FastBody, Real),
     /// The same of a bullet.
     Bullet(FastBody),
     /// The body has moved, and there are bullets.
@@ -319,6 +321,7 @@ impl World {
             deepest_rest: if settings.slop > 0.0 { DEEPEST_REST * settings.slop } else { 1e6 },
             softness,
             restitution_threshold: settings.restitution_threshold,
+            squares: SquareScale::new(settings.length_unit),
         };
         // Against the ground twice as stiff: what stands on it has the weight of all above.
         let soft = pass(Softness::new(hertz, settings.contact_damping_ratio, substep));
@@ -384,15 +387,20 @@ impl World {
         // Threads report in any order; the report must not depend on it.
         news.sort_unstable_by_key(|item| match *item {
             BodyNews::Broken(body) => (0, body),
-            BodyNews::Fast(fast) => (1, fast.index),
+            BodyNews::Fast(fast) | BodyNews::Passing(fast, _) => (1, fast.index),
             BodyNews::Bullet(fast) => (2, fast.index),
             BodyNews::Moved(fast) => (3, fast.index),
         });
         let mut fast = std::mem::take(&mut self.scratch.fast);
         let mut bullets = std::mem::take(&mut self.scratch.bullets);
         let mut movers = std::mem::take(&mut self.scratch.movers);
+        let mut resting = None;
         for item in news.drain(..) {
             match item {
+                BodyNews::Passing(body, traveled) => {
+                    let resting = resting.get_or_insert_with(|| self.list_resting_kinematic());
+                    fast.extend(self.may_pass(&body, traveled, resting).then_some(body));
+                }
                 BodyNews::Broken(body) => {
                     self.freeze(body);
                     report.frozen.push(self.body_id(body));
@@ -402,6 +410,7 @@ impl World {
                 BodyNews::Moved(body) => movers.push(body),
             }
         }
+        self.scratch.kinematic = resting.unwrap_or_else(|| std::mem::take(&mut self.scratch.kinematic));
         self.stop_at_impacts(&mut fast);
         self.fly_bullets(&bullets, &movers);
         [&mut fast, &mut bullets, &mut movers].into_iter().for_each(Vec::clear);
@@ -411,7 +420,7 @@ impl World {
 
     fn finalize_bodies(&mut self, dt: Real, news: &Gather<BodyNews>, left: &Gather<u32>) {
         let mut kinematic = std::mem::take(&mut self.scratch.kinematic);
-        self.list_kinematic_bodies(&mut kinematic);
+        self.list_kinematic_bodies(true, &mut kinematic);
         let awake = &self.scratch.sorted_awake;
         let world = FinalizeContext {
             shapes: &self.shapes,
@@ -420,6 +429,7 @@ impl World {
             settings: &self.scaled,
             any_bullets: !self.bullets.is_empty(),
             kinematic: &kinematic,
+            any_resting: self.kinematic.len() > self.awake_kinematic.len(),
             dt,
         };
         let rested = AtomicBool::new(false);
@@ -444,6 +454,23 @@ impl World {
         });
         self.scratch.any_rested = rested.into_inner();
         self.scratch.kinematic = kinematic;
+    }
+
+    /// The kinematic bodies at rest. They are listed when the first body of a step asks: where nothing is fast they cost
+    /// nothing, however many there are.
+    fn list_resting_kinematic(&mut self) -> Vec<KinematicBody> {
+        let mut resting = std::mem::take(&mut self.scratch.kinematic);
+        self.list_kinematic_bodies(false, &mut resting);
+        resting
+    }
+
+    /// Whether a body, none of whose points has come farther than `traveled`, may have passed through one of some kinematic
+    /// bodies.
+    fn may_pass(&self, fast: &FastBody, traveled: Real, kinematic: &[KinematicBody]) -> bool {
+        let body = &self.bodies[fast.index as usize];
+        let center = self.solver_bodies.masses[fast.index as usize].center;
+        let own = (traveled, body.reach, 0.5 * body.inner_radius);
+        kinematic.iter().any(|other| other.may_be_passed(center, own))
     }
 
     /// Puts a body that went non-finite back to its last finite pose and stops it.
@@ -550,8 +577,9 @@ struct FinalizeContext<'a> {
     settings: &'a super::WorldSettings,
     /// Whether there are bullets.
     any_bullets: bool,
-    /// The kinematic bodies.
+    /// The kinematic bodies that are awake, and whether there are others.
     kinematic: &'a [KinematicBody],
+    any_resting: bool,
     dt: Real,
 }
 
@@ -620,12 +648,17 @@ impl FinalizeContext<'_> {
         if self.any_bullets {
             news.push(BodyNews::Moved(fast));
         }
-        if body.is_dynamic() && swept && self.may_pass(body, fast.start.position, (state.translation, traveled)) {
-            news.push(BodyNews::Fast(fast));
+        if body.is_dynamic() && swept {
+            if self.may_pass(body, fast.start.position, (state.translation, traveled)) {
+                news.push(BodyNews::Fast(fast));
+            } else if self.any_resting {
+                news.push(BodyNews::Passing(fast, traveled));
+            }
         }
     }
 
-    /// Whether a body, none of whose points has come farther than `traveled`, may have passed through something.
+    /// Whether a body, none of whose points has come farther than `traveled`, may have passed through something other than a
+    /// kinematic body at rest.
     fn may_pass(&self, body: &super::bodies::Body, start: Vec3, (translation, traveled): (Vec3, Real)) -> bool {
         let (center, own) = (start + translation, (traveled, body.reach, 0.5 * body.inner_radius));
         self.kinematic.iter().any(|other| other.may_be_passed(center, own))

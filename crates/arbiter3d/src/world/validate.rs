@@ -36,6 +36,12 @@ impl World {
                 return Err(format!("body {index} at place {place} of the awake list: {body:?}"));
             }
         }
+        let kinematic = |&index: &u32| self.bodies[index as usize].kind == BodyKind::Kinematic;
+        let mut awake_kinematic: Vec<u32> = self.awake.iter().copied().filter(kinematic).collect();
+        awake_kinematic.sort_unstable();
+        if awake_kinematic != self.awake_kinematic {
+            return Err(format!("awake kinematic bodies {awake_kinematic:?}, listed {:?}", self.awake_kinematic));
+        }
         for (index, body) in self.bodies.iter().enumerate().filter(|(_, body)| body.alive) {
             let state = &self.solver_bodies.states[index];
             if !body.pose.is_finite() || !state.linear_velocity.is_finite() || !state.angular_velocity.is_finite() {

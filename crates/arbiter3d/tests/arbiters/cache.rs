@@ -1,5 +1,6 @@
 //! The cache rules and the breaking of contacts, through registered contacts.
 
+use crate::common::Random;
 use crate::support::*;
 use arbiter3d::math::{Quat, Vec3};
 use arbiter3d::narrow_phase::{Manifold, PairCache, collide};
@@ -124,14 +125,10 @@ fn the_kept_patch_is_the_widest_there_is() {
         let pairs = [(p[0] - p[1], p[2] - p[3]), (p[0] - p[2], p[1] - p[3]), (p[0] - p[3], p[1] - p[2])];
         pairs.iter().map(|(a, b)| a.cross(*b).length()).fold(0.0_f32, f32::max)
     };
-    let mut state = 1_u32;
-    let mut random = || {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        (state >> 8) as f32 / (1 << 24) as f32 * 2.0 - 1.0
-    };
+    let mut random = Random(1);
     for round in 0..300 {
         let (mut world, _, id) = bare_world();
-        let points: [Vec3; 5] = std::array::from_fn(|_| Vec3::new(random(), 0.0, random()));
+        let points: [Vec3; 5] = std::array::from_fn(|_| random.vector(1.0) * Vec3::new(1.0, 0.0, 1.0));
         let close = |i: usize, j: usize| (points[i] - points[j]).length() < 0.05;
         if (0..5).any(|i| (0..i).any(|j| close(i, j))) {
             continue;

@@ -81,7 +81,8 @@ fn lists_hold_what_happened_until_the_next_step_and_between_steps() {
     assert_eq!(world.end_events().len(), 0);
 }
 
-/// A ball that touches the floor's top while falling at 2 m/s without turning, no gravity, no friction. After one step, its velocity.
+/// A ball that touches the floor's top while falling at 2 m/s without turning, no gravity, no friction. After one step,
+/// its velocity.
 fn velocity_after_begin(edit: impl Fn(&mut ContactData) + Send + Sync + 'static) -> Vec3 {
     let mut world = weightless();
     let floor = add_floor(&mut world);

@@ -4,6 +4,8 @@
 //! events, custom arbiters, the cache rules, solve modes, manifolds, sleep, and misuse.
 
 mod cache;
+#[path = "../common/mod.rs"]
+mod common;
 mod custom;
 mod events;
 mod lifecycle;

@@ -1,17 +1,17 @@
 //! Random use of everything that touches arbiters: the world stays consistent, and every begin has its end.
 
+use crate::common::Random;
 use crate::support::*;
 use arbiter3d::math::Vec3;
 use arbiter3d::*;
 
 /// Small whole numbers from a seed.
 #[derive(Clone)]
-struct Dice(u64);
+struct Dice(Random);
 
 impl Dice {
     fn roll(&mut self, sides: u64) -> u64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 33) % sides
+        self.0.bits() % sides
     }
 
     fn place(&mut self) -> Vec3 {
@@ -111,13 +111,13 @@ fn add_meddlers(world: &mut World, seed: u64, keys: &std::ops::Range<u64>) {
             _ => {}
         }
     };
-    let mut at_begin = meddle(Dice(seed ^ 1), keys.start);
+    let mut at_begin = meddle(Dice(Random(seed ^ 1)), keys.start);
     world.on_begin_collide(Box::new(move |context, id| {
         let arbiter = context.arbiter(id).expect("alive while its begin is raised");
         let (b1, b2) = (arbiter.body1(), arbiter.body2());
         at_begin(context, b1, b2);
     }));
-    let mut at_end = meddle(Dice(seed ^ 2), keys.start);
+    let mut at_end = meddle(Dice(Random(seed ^ 2)), keys.start);
     world.on_end_collide(Box::new(move |context, event| at_end(context, event.body1, event.body2)));
 }
 
@@ -133,7 +133,7 @@ fn run(seed: u64, threads: usize) -> (u64, usize) {
     if !seed.is_multiple_of(3) {
         add_meddlers(&mut world, seed, &keys);
     }
-    let mut dice = Dice(seed);
+    let mut dice = Dice(Random(seed));
     let mut hash = 0_u64;
     for call in 0..400 {
         act(&mut world, &mut dice, &keys);

@@ -130,6 +130,7 @@ pub fn assert_near(actual: f32, expected: f32, tolerance: f32, what: &str) {
 }
 
 /// A small random generator (SplitMix64) with the same numbers everywhere.
+#[derive(Clone)]
 pub struct Random(pub u64);
 
 impl Random {

@@ -1,4 +1,5 @@
-//! Rays at shared edges and corners of meshes and height fields: none slips through. And as many rays as it takes against brute force.
+//! Rays at shared edges and corners of meshes and height fields: none slips through. And as many rays as it takes
+//! against brute force.
 
 use crate::common::*;
 use crate::{brute_force, strewn_with};

@@ -2,29 +2,11 @@
 
 use super::*;
 use crate::math::{Real, Vec3};
+use crate::random::Random;
 
-/// A small generator for test data: PCG's linear step, top bits.
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, end: u32) -> u32 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        ((self.0 >> 33) as u32) % end
-    }
-
-    /// From -1 to 1.
-    fn signed(&mut self) -> Real {
-        self.below(20_001) as Real / 10_000.0 - 1.0
-    }
-
-    fn vector(&mut self) -> Vec3 {
-        Vec3::new(self.signed(), self.signed(), self.signed())
-    }
-
-    fn aabb(&mut self) -> Aabb {
-        let half_extents = Vec3::new(0.1, 0.1, 0.1) + self.vector().abs() * 0.6;
-        Aabb::from_center(self.vector() * 8.0, half_extents)
-    }
+fn box_of(random: &mut Random) -> Aabb {
+    let half_extents = Vec3::splat(0.1) + random.vector().abs() * 0.6;
+    Aabb::from_center(random.vector() * 8.0, half_extents)
 }
 
 /// Leaves and what their boxes should be.
@@ -45,7 +27,7 @@ impl Model {
     fn edit(&mut self, random: &mut Random) {
         let kind = random.below(10);
         if self.boxes.len() < 5 || kind < 3 {
-            self.insert(random.aabb());
+            self.insert(box_of(random));
             return;
         }
         let index = random.below(self.boxes.len() as u32) as usize;
@@ -61,7 +43,7 @@ impl Model {
                 self.tree.move_leaf(*leaf, aabb);
             }
             8 => {
-                *aabb = random.aabb();
+                *aabb = box_of(random);
                 self.tree.move_leaf(*leaf, aabb);
             }
             _ => self.tree.mark(*leaf),
@@ -92,7 +74,7 @@ impl Model {
             assert_eq!((*self.tree.aabb(leaf), self.tree.data(leaf)), (aabb, data));
         }
         let mut found = Vec::new();
-        let probe = random.aabb().expand(0.5);
+        let probe = box_of(random).expand(0.5);
         self.tree.query(&probe, |data| {
             found.push(data);
             true
@@ -312,7 +294,7 @@ fn a_rebuild_restores_the_cost() {
     let mut random = Random(3);
     let (mut tree, mut boxes) = (DynamicTree::new(), Vec::new());
     for i in 0..2_000 {
-        let aabb = random.aabb();
+        let aabb = box_of(&mut random);
         boxes.push((tree.insert(aabb, i), aabb));
     }
     let fresh = tree.cost();
@@ -335,12 +317,12 @@ fn a_refit_is_tight() {
     let mut random = Random(9);
     let (mut tree, mut leaves) = (DynamicTree::new(), Vec::new());
     for i in 0..500 {
-        leaves.push(tree.insert(random.aabb(), i));
+        leaves.push(tree.insert(box_of(&mut random), i));
     }
     for _ in 0..20 {
         for _ in 0..30 {
             let leaf = leaves[random.below(500) as usize];
-            tree.move_leaf(leaf, &random.aabb());
+            tree.move_leaf(leaf, &box_of(&mut random));
         }
         tree.refit_marked();
         tree.clear_marks(|_, _| (), None);

@@ -1,9 +1,9 @@
 //! Pairs of cuboids side by side, and their contacts.
 
-use super::super::polyhedron::cuboid_size;
 use super::super::{Manifold, ManifoldPoint};
 use crate::math::{Pose, Real, Rotation, Vec3, min};
 use crate::shape::Cuboid;
+use crate::shape::polyhedron::cuboid_size;
 use crate::simd::{LanePose, LaneRotation, LaneVec3, Lanes, Number, Quad, Wide};
 
 /// Two cuboids, told in the frame of the first, in groups of four numbers: half extents of the first and margin; half

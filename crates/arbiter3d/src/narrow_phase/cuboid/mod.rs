@@ -30,11 +30,11 @@ mod lanes;
 pub(crate) use axes::Near;
 pub(crate) use lanes::{CuboidLanes, CuboidPair, WideManifold};
 
-use super::distance::closest;
-use super::support::Support;
 use super::{Manifold, ManifoldPoint};
 use crate::math::{Mat3, Pose, Real, Vec3, clamp};
 use crate::shape::Cuboid;
+use crate::shape::Support;
+use crate::shape::distance::closest;
 use crate::simd::{Lanes, Number, Quad, Wide};
 
 /// A face of box 2 is the reference when it is better by this share of the smaller box's [`cuboid_size`].

@@ -1,8 +1,8 @@
 //! Lanes against one pair at a time.
 
-use super::super::tests::Random;
 use super::{CuboidLanes, CuboidPair, Manifold, Near, WideManifold, cuboid_cuboid};
 use crate::math::{Pose, Real, Rotation, Vec3};
+use crate::random::Random;
 use crate::shape::Cuboid;
 use crate::simd::{Baseline, Instructions, Kernel, Lanes, Wide};
 use std::marker::PhantomData;

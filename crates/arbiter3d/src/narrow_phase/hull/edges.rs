@@ -2,7 +2,7 @@
 
 use super::{Axis, EDGES};
 use crate::math::{Mat3, Real, Vec3, max, normalize_or};
-use crate::narrow_phase::polyhedron::{Polyhedron, negatives};
+use crate::shape::polyhedron::{Polyhedron, negatives};
 use crate::shape::{HalfEdge, LANES};
 
 /// Edges with `sin²` of their angle below this are parallel: faces stand in for them.

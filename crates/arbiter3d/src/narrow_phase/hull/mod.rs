@@ -16,7 +16,7 @@
 //! features next to the contact.
 //!
 //! Faces and edges are weighed against each other as in the cuboid kernel, with
-//! [`tolerance_size`](super::polyhedron::tolerance_size) of the inner radius.
+//! [`tolerance_size`](crate::shape::polyhedron::tolerance_size) of the inner radius.
 //!
 //! The cache holds the last axis. It ends the search where the hulls are still apart along it, and else its gap is the
 //! first to beat, which leaves out more candidates. As equal gaps go to the lowest face or edges in any case, the
@@ -29,11 +29,11 @@ mod edges;
 mod view;
 
 use super::cuboid::{ALIGNED, EDGE_BIAS, stands_in};
-use super::distance::closest;
-use super::polyhedron::{CuboidFeatures, Polyhedron};
-use super::support::Support;
 use super::{Manifold, ManifoldPoint, PairCache};
 use crate::math::{Mat3, Pose, Real, Vec3, clamp, min};
+use crate::shape::Support;
+use crate::shape::distance::closest;
+use crate::shape::polyhedron::{CuboidFeatures, Polyhedron};
 use crate::shape::{ConvexHull, Cuboid, Plane};
 #[cfg(target_arch = "x86_64")]
 use crate::simd::Avx2;

@@ -1,11 +1,12 @@
 //! Hulls of all proportions against separating axes in `f64`, and what must not change a bit.
 
-use super::super::distance::closest;
-use super::super::tests::{Random, contacts, hull_oracle};
+use super::super::tests::{contacts, hull_oracle};
 use super::super::{collide, collide_on};
 use super::*;
 use crate::math::Rotation;
+use crate::random::Random;
 use crate::shape::Shape;
+use crate::shape::distance::closest;
 
 /// Rocks, plates, needles and boxes about one size, as hulls and as cuboids.
 fn solids(random: &mut Random, size: Real) -> Vec<Shape> {

@@ -4,9 +4,9 @@ use super::edges::{EdgeSet, MAX_EDGE_WORDS};
 use super::{BALL_SLACK, face_gap, transposed_mul};
 use crate::math::{Mat3, Real, Vec3, max};
 use crate::narrow_phase::clip::{ClipPoint, clip_polygon, reduce};
-use crate::narrow_phase::polyhedron::{ALL_LANES, Polyhedron, negatives};
 use crate::narrow_phase::{Manifold, ManifoldPoint};
 use crate::shape::LANES;
+use crate::shape::polyhedron::{ALL_LANES, Polyhedron, negatives};
 
 /// Share of the smaller size by which side planes are moved out, so that corners on the border stay corners.
 const GROWTH: Real = 1e-4;

@@ -14,8 +14,9 @@
 //!
 //! A field keeps its heights, a byte a cell (by which kind of bend the surface crosses its low-x edge, its low-z edge and its
 //! diagonal; whether it is a hole; which diagonal), a byte a corner (whether an edge that can touch, or any that is not flat,
-//! ends there), and the lowest and highest point of blocks of 4 × 4, 16 × 16, … cells: 6.6 bytes a cell. All else is made from
-//! the heights when it is asked for, by the same rules as for meshes (`mesh_edges`), so contacts are those of the same mesh.
+//! ends there), and the lowest and highest point of blocks of 4 × 4, 16 × 16, … cells: 6.6 bytes a cell. All else is
+//! made from the heights when it is asked for, by the same rules as for meshes (`mesh_edges`), so contacts are those of
+//! the same mesh.
 //!
 //! The outer border, unless it is told to end there, goes on beside the field for all that the field knows: it pushes along the
 //! faces only, never from its rim, so tiles laid side by side, on one body or on many, have no seam that a wheel could feel.
@@ -30,11 +31,11 @@ mod tests;
 use super::geometry::Geometry;
 use super::mesh::{Facet, MeshRayHit, MeshSides, unit_normal};
 use super::mesh_tree::LEAF;
+use super::ray::{Ray, ShapeHit};
 use super::surface::Surface;
 use super::surface_ray::first_triangle;
 use super::{MassProperties, ShapeError, positive};
 use crate::math::{Aabb, Real, Vec3};
-use crate::query::{Ray, ShapeHit};
 use crate::simd::{LaneVec3, Lanes};
 use blocks::Level;
 
@@ -149,7 +150,8 @@ impl HeightField {
         Ok(self)
     }
 
-    /// The same with materials: for each cell, row by row, which of [`ShapeDefinition::palette`](crate::ShapeDefinition::palette).
+    /// The same with materials: for each cell, row by row, which of
+    /// [`ShapeDefinition::palette`](crate::ShapeDefinition::palette).
     ///
     /// # Errors
     /// If there are not as many as cells.

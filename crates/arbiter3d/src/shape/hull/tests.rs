@@ -2,36 +2,7 @@
 
 use super::*;
 use crate::math::{Pose, Rotation};
-
-/// A small generator with a fixed sequence (Marsaglia's xorshift).
-struct Random(u64);
-
-impl Random {
-    fn unit(&mut self) -> Real {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 >> 40) as Real / (1 << 24) as Real
-    }
-
-    fn in_cube(&mut self) -> Vec3 {
-        Vec3::new(self.unit() - 0.5, self.unit() - 0.5, self.unit() - 0.5) * 2.0
-    }
-
-    fn in_ball(&mut self) -> Vec3 {
-        loop {
-            let point = self.in_cube();
-            if point.length_squared() <= 1.0 {
-                return point;
-            }
-        }
-    }
-
-    fn rotation(&mut self) -> Rotation {
-        let axis = self.in_ball();
-        Rotation::from_xyzw(axis.x, axis.y, axis.z, self.unit() + 0.1).normalize()
-    }
-}
+use crate::random::Random;
 
 fn cloud(seed: u64, count: usize) -> Vec<Vec3> {
     let mut random = Random(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1);
@@ -134,7 +105,7 @@ fn known_solids_have_their_vertices_edges_and_faces() {
     let mut random = Random(77);
     for (points, vertices, edges, faces) in solids {
         for turn in 0..40 {
-            let shift = if turn & 1 == 0 { Vec3::ZERO } else { random.in_cube() * 10.0 };
+            let shift = if turn & 1 == 0 { Vec3::ZERO } else { random.vector() * 10.0 };
             let placed = if turn == 0 { points.clone() } else { rotated(&points, random.rotation(), shift) };
             let hull = ConvexHull::new(&placed).unwrap();
             assert_eq!((hull.vertices().len(), hull.edges().len() / 2, hull.planes().len()), (vertices, edges, faces));
@@ -148,7 +119,7 @@ fn a_cube_of_inner_duplicate_and_face_points_is_a_cube() {
     let mut random = Random(5);
     let mut points: Vec<Vec3> = Vec::new();
     for _ in 0..2000 {
-        let mut point = random.in_cube();
+        let mut point = random.vector();
         points.push(point);
         point[(random.unit() * 3.0) as usize] = if random.unit() < 0.5 { -1.0 } else { 1.0 };
         points.push(point);
@@ -188,8 +159,8 @@ fn nearly_degenerate(random: &mut Random, round: usize) -> Vec<Vec3> {
         _ => cloud(seed, 60).iter().map(|p| Vec3::new(p.x, p.y, (1.0 - p.x * p.x - p.y * p.y) * thin)).collect(),
     };
     let squash = Vec3::new(1.0, small(4.0 * random.unit() * random.unit()), small(4.0 * random.unit() * random.unit()));
-    let jittered: Vec<Vec3> = base.iter().chain(&base).map(|p| (*p + random.in_cube() * noise) * squash).collect();
-    let shift = if round.is_multiple_of(2) { Vec3::ZERO } else { random.in_cube() * 3.0 };
+    let jittered: Vec<Vec3> = base.iter().chain(&base).map(|p| (*p + random.vector() * noise) * squash).collect();
+    let shift = if round.is_multiple_of(2) { Vec3::ZERO } else { random.vector() * 3.0 };
     if round.is_multiple_of(3) { jittered } else { rotated(&jittered, random.rotation(), shift) }
 }
 
@@ -358,7 +329,7 @@ fn support_is_the_first_farthest_vertex() {
         };
         for k in 0..100 {
             let axis = [Vec3::X, -Vec3::Y, Vec3::Z, Vec3::ZERO, Vec3::new(-1.0, 0.0, 1.0)];
-            let direction = axis.get(k).copied().unwrap_or(random.in_cube());
+            let direction = axis.get(k).copied().unwrap_or(random.vector());
             let reach = |v: &Vec3| v.x * direction.x + v.y * direction.y + v.z * direction.z;
             let farthest = hull.vertices().iter().map(reach).fold(-Real::INFINITY, Real::max);
             let first = hull.vertices().iter().position(|v| reach(v) == farthest).unwrap();

@@ -4,8 +4,8 @@
 //! the anchors turn and move with their bodies, so gaps stay exact; the choice of points, the normal and the levers are those
 //! of when it was made. That keeps tall stacks up: were normals and levers to follow each small tilt, a soft stack would
 //! buckle under its own weight as a tall column does (measured: a triangle of 100 rows falls after 8 s, and stands for good
-//! with levers kept). Where a pair turns together, on a turntable, normal and levers are turned along every 1.4°. Materials and arbiters are read anew each step
-//! whatever is used again.
+//! with levers kept). Where a pair turns together, on a turntable, normal and levers are turned along every 1.4°.
+//! Materials and arbiters are read anew each step whatever is used again.
 //!
 //! Pairs are independent: they run on all threads in blocks of neighbours in memory ([`block`]), each writing its own arbiter
 //! ([`contacts`]). What begins is gathered and sorted by key.

@@ -3,8 +3,9 @@
 //! After the narrow phase, a body with new contacts against such shapes is looked at if it has several of them, not all with
 //! one normal: each contact that another shape hides (see `narrow_phase::seam`) is left out of this step's solve. An arbiter
 //! all of whose contacts are hidden keeps them and is not solved, so that it goes on as long as the shapes touch; from one with
-//! others too, the hidden ones are taken. One that bears with a normal that is a little off gets that of the surface. The manifold of either is made anew in the next step, whatever moves: so what was
-//! hidden comes back as soon as nothing hides it, and the other way round.
+//! others too, the hidden ones are taken. One that bears with a normal that is a little off gets that of the surface.
+//! The manifold of either is made anew in the next step, whatever moves: so what was hidden comes back as soon as
+//! nothing hides it, and the other way round.
 //!
 //! Each body looks at its own arbiters alone, and decides on all before it changes any: order and threads do not matter.
 
@@ -16,7 +17,7 @@ use crate::edge_lists::EdgeLists;
 use crate::math::{Pose, Real, Vec3};
 use crate::narrow_phase::{Patch, SeamCast as Cast, Verdict, scale_of};
 use crate::parallel::{SharedSlice, StagePool};
-use crate::query::{Ray, ShapeHit, cast_placed};
+use crate::shape::{Ray, ShapeHit, cast_placed};
 use crate::solver::SolverBodies;
 use crate::storage::FixedList;
 

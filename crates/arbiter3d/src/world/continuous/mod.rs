@@ -160,9 +160,9 @@ impl World {
         let sweeps = |index: u32| {
             let (body, state) = (&self.bodies[index as usize], &self.solver_bodies.states[index as usize]);
             let way = state.translation.length() + state.turn.length() * body.reach;
-            body.sweeps() && body.awake && way > body.inner_radius
+            body.sweeps() && way > body.inner_radius
         };
-        self.scaled.continuous && self.kinematic.iter().any(|&index| sweeps(index))
+        self.scaled.continuous && self.awake_kinematic.iter().any(|&index| sweeps(index))
     }
 
     /// Appends the slow and the sleeping bodies that kinematic ones may have swept over.
@@ -205,13 +205,16 @@ impl World {
         fast.truncate(kept);
     }
 
-    /// Lists the kinematic bodies, where they go in this step.
-    pub(crate) fn list_kinematic_bodies(&mut self, list: &mut Vec<KinematicBody>) {
+    /// Lists the kinematic bodies that are awake, where they go in this step; or those at rest.
+    pub(crate) fn list_kinematic_bodies(&self, awake: bool, list: &mut Vec<KinematicBody>) {
         list.clear();
-        for &index in self.kinematic.iter().filter(|&&index| self.bodies[index as usize].enabled) {
+        let among = if awake { &self.awake_kinematic } else { &self.kinematic };
+        for &index in among {
             let (body, state) = (&self.bodies[index as usize], &self.solver_bodies.states[index as usize]);
-            let (moved, turned) =
-                if body.awake { (state.translation.length(), state.turn.length()) } else { (0.0, 0.0) };
+            if !body.enabled || body.awake != awake {
+                continue;
+            }
+            let (moved, turned) = if awake { (state.translation.length(), state.turn.length()) } else { (0.0, 0.0) };
             let center = self.solver_bodies.masses[index as usize].center;
             let (reach, thickness) = (body.reach, body.inner_radius);
             crate::storage::push(list, KinematicBody { center, moved, turned, reach, thickness });

@@ -7,7 +7,8 @@
 use super::rays::checked_ray;
 use super::{CastHit, QueryFilter, RayHit, casts::checked_cast};
 use crate::error::Error;
-use crate::query::{Ray, ShapeCast};
+use crate::query::ShapeCast;
+use crate::shape::Ray;
 use crate::world::World;
 use std::sync::{Mutex, PoisonError};
 

@@ -46,9 +46,22 @@ impl World {
         margin: Real,
         filter: &QueryFilter<'_>,
     ) -> Result<Vec<ShapeContacts>, Error> {
+        let mut found = Vec::new();
+        self.collect_contacts((shape, pose), margin, filter, &mut found)?;
+        Ok(found)
+    }
+
+    /// As [`World::collide_shape`], into a list that is overwritten.
+    pub(crate) fn collect_contacts(
+        &self,
+        (shape, pose): (&Shape, &Pose),
+        margin: Real,
+        filter: &QueryFilter<'_>,
+        found: &mut Vec<ShapeContacts>,
+    ) -> Result<(), Error> {
+        found.clear();
         let pose = checked_pose("pose", pose)?;
         crate::error::in_range("margin", margin, 0.0, Real::MAX)?;
-        let mut found = Vec::new();
         let aabb = shape.aabb(&pose).expand(margin);
         self.broad_phase.query(&aabb, |slot| {
             if self.tight_aabb(slot).overlaps(&aabb) && self.sees(filter, slot) {
@@ -62,7 +75,7 @@ impl World {
             true
         });
         found.sort_unstable_by_key(|contacts| contacts.shape);
-        Ok(found)
+        Ok(())
     }
 
     /// Contact points of two shapes of the world that are closer than `margin` (metres, zero or more), world: `point1`

@@ -4,8 +4,8 @@ use super::QueryFilter;
 use crate::error::{Error, finite_vec};
 use crate::id::{BodyId, ShapeId};
 use crate::math::{Real, Vec3};
-use crate::query::Ray;
 use crate::query::ray::{PartHit, find};
+use crate::shape::Ray;
 use crate::world::{Material, World};
 
 /// Where a ray meets a shape.

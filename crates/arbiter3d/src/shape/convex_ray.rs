@@ -3,12 +3,12 @@
 //! A cylinder is the part of an endless one between two planes, a cone the part of an endless one over a plane: the line is
 //! inside for an interval of each, and enters the shape where the last of them begins. The quadratics are solved in `f64`.
 //!
-//! Any other convex shape is met by a point that is cast at it (`narrow_phase::linear_cast`).
+//! Any other convex shape is met by a point that is cast at it (`distance::linear_cast`).
 
-use super::ray::{Ray, ShapeHit};
+use super::distance::{Cast, linear_cast};
+use super::support::Support;
+use super::{Cone, Cylinder, Ray, ShapeHit};
 use crate::math::{Pose, Real, Vec3};
-use crate::narrow_phase::{Cast, Support, linear_cast};
-use crate::shape::{Cone, Cylinder};
 use glam::DVec3;
 
 /// Where a line is inside something, and the outward normal where it enters.
@@ -52,7 +52,7 @@ impl Stretch {
 }
 
 /// Cylinder along y.
-pub(crate) fn cast_cylinder(cylinder: &Cylinder, ray: &Ray) -> Option<ShapeHit> {
+pub(super) fn cast_cylinder(cylinder: &Cylinder, ray: &Ray) -> Option<ShapeHit> {
     let (r, h) = (f64::from(cylinder.radius()), f64::from(cylinder.half_length()));
     let (o, d) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
     let top = Stretch::behind(DVec3::Y, o.y - h, d.y)?;
@@ -77,7 +77,7 @@ pub(crate) fn cast_cylinder(cylinder: &Cylinder, ray: &Ray) -> Option<ShapeHit> 
 }
 
 /// Cone along y, its tip up: `x² + z² ≤ k² w²` with `w = h − y ≥ 0` and `k = r / 2h`.
-pub(crate) fn cast_cone(cone: &Cone, ray: &Ray) -> Option<ShapeHit> {
+pub(super) fn cast_cone(cone: &Cone, ray: &Ray) -> Option<ShapeHit> {
     let (r, h) = (f64::from(cone.radius()), f64::from(cone.half_length()));
     let (o, d) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
     let base = Stretch::behind(-DVec3::Y, -o.y - h, -d.y)?;
@@ -123,7 +123,7 @@ pub(crate) fn cast_cone(cone: &Cone, ray: &Ray) -> Option<ShapeHit> {
 }
 
 /// Any bounded convex shape.
-pub(crate) fn cast_support(support: &Support<'_>, ray: &Ray) -> Option<ShapeHit> {
+pub(super) fn cast_support(support: &Support<'_>, ray: &Ray) -> Option<ShapeHit> {
     if !(ray.origin.is_finite() && ray.direction.is_finite() && ray.max_fraction >= 0.0) {
         return None;
     }
@@ -141,7 +141,8 @@ pub(crate) fn cast_support(support: &Support<'_>, ray: &Ray) -> Option<ShapeHit>
 mod tests {
     use super::*;
     use crate::math::{Mat3, tangents};
-    use crate::narrow_phase::{Random, closest};
+    use crate::random::Random;
+    use crate::shape::distance::closest;
     use crate::shape::{Shape, Sphere};
 
     fn shapes(size: Real) -> Vec<Shape> {

@@ -1,6 +1,9 @@
 //! Rays against closed formulas, and against marching along the exact distance of the shape.
 
+use super::super::convex_ray::cast_support;
+use super::super::support::Support;
 use super::*;
+use crate::random::Random;
 
 fn ray(origin: [Real; 3], direction: [Real; 3], max_fraction: Real) -> Ray {
     Ray { origin: origin.into(), direction: direction.into(), max_fraction }
@@ -154,18 +157,6 @@ fn march(shape: &Shape, ray: &Ray) -> Option<f64> {
     None
 }
 
-struct Random(u64);
-
-impl Random {
-    fn vector(&mut self) -> Vec3 {
-        let mut signed = || {
-            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            ((self.0 >> 40) as f64 / f64::from(1 << 23) - 1.0) as Real
-        };
-        Vec3::new(signed(), signed(), signed())
-    }
-}
-
 /// 10,000 random rays a shape: same answer as marching, a point on the surface, and the normal is the distance's gradient.
 #[test]
 fn random_rays_agree_with_marching() {
@@ -221,21 +212,22 @@ fn any_convex_shape_is_hit_where_the_kernels_hit() {
     let points: Vec<Vec3> = (0..30).map(|_| random.vector()).collect();
     let hull = Shape::hull(&points).unwrap();
     for shape in [sphere(0.8), Shape::capsule(0.9, 0.4).unwrap(), cuboid(Vec3::new(0.5, 1.1, 0.8)), hull] {
+        let support = Support::new(&shape).unwrap();
         let mut hits = 0;
         for _ in 0..5_000 {
             let ray = Ray { origin: random.vector() * 2.0, direction: random.vector() * 4.0, max_fraction: 1.0 };
-            let (kernel, parts) = (cast_ray(&shape, &ray), cast_parts(&shape, &ray));
-            let (Some(kernel), Some(parts)) = (kernel, parts) else {
+            let (kernel, general) = (cast_ray(&shape, &ray), cast_support(&support, &ray));
+            let (Some(kernel), Some(general)) = (kernel, general) else {
                 // What one grazes the other may miss.
-                let hit = kernel.or(parts.map(|part| part.hit));
+                let hit = kernel.or(general);
                 let grazes = |hit: ShapeHit| hit.normal.dot(ray.direction).abs() < 0.03 || hit.fraction > 0.9999;
                 assert!(hit.is_none_or(grazes), "{shape:?} {ray:?} {hit:?}");
                 continue;
             };
             hits += 1;
             let slant = (kernel.normal.dot(ray.direction).abs() / ray.direction.length()).max(0.01);
-            let off = (kernel.fraction - parts.hit.fraction).abs() * ray.direction.length() * slant;
-            assert!(off < 2e-5, "{shape:?} {ray:?}: {kernel:?} {parts:?}");
+            let off = (kernel.fraction - general.fraction).abs() * ray.direction.length() * slant;
+            assert!(off < 2e-5, "{shape:?} {ray:?}: {kernel:?} {general:?}");
         }
         assert!(hits > 300, "{hits}");
     }

@@ -21,7 +21,7 @@ mod linear_cast;
 mod newton;
 
 pub(crate) use linear_cast::{Cast, CastPoint, linear_cast};
-pub(super) use newton::{Settled, tangents};
+pub(crate) use newton::{Settled, tangents};
 
 /// Cores closer than this share of their size overlap: beyond it the direction is rounding.
 const TOUCHING: f64 = 1e-9;
@@ -55,14 +55,14 @@ pub(crate) struct Closest {
 
 /// An extreme point of the difference `x2 − x1`, and where on shape 1 it comes from.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Corner {
-    pub(super) difference: DVec3,
-    pub(super) point1: DVec3,
+pub(crate) struct Corner {
+    pub(crate) difference: DVec3,
+    pub(crate) point1: DVec3,
 }
 
 /// Up to four corners and the weights that make the point closest to the origin.
 #[derive(Default)]
-pub(super) struct Simplex {
+pub(crate) struct Simplex {
     corners: [Corner; 4],
     weights: [f64; 4],
     count: usize,
@@ -87,16 +87,16 @@ pub(crate) fn closest(shape1: &Support, shape2: &Support, pose: &Pose) -> Option
 
 /// The closest points of two cores as found, not rounded.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Gap {
+pub(crate) struct Gap {
     /// On the core of shape 1.
-    pub(super) point1: DVec3,
+    pub(crate) point1: DVec3,
     /// From there to the core of shape 2; never zero.
-    pub(super) way: DVec3,
+    pub(crate) way: DVec3,
 }
 
 /// How two cores lie.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Nearness {
+pub(crate) enum Nearness {
     /// Farther apart than was asked for.
     Beyond,
     Gap(Gap),
@@ -175,12 +175,12 @@ fn unit(v: DVec3) -> Vec3 {
     v.as_vec3()
 }
 
-pub(super) fn larger(a: f64, b: f64) -> f64 {
+pub(crate) fn larger(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
 /// Two shapes and the placement of the second one.
-pub(super) struct Placed<'a> {
+pub(crate) struct Placed<'a> {
     shapes: [&'a Support<'a>; 2],
     cores: [Core<'a>; 2],
     rotation: DMat3,
@@ -189,7 +189,7 @@ pub(super) struct Placed<'a> {
 }
 
 impl<'a> Placed<'a> {
-    pub(super) fn new(shape1: &'a Support<'a>, shape2: &'a Support<'a>, pose: &Pose) -> Self {
+    pub(crate) fn new(shape1: &'a Support<'a>, shape2: &'a Support<'a>, pose: &Pose) -> Self {
         let m = pose.rotation.to_mat3();
         let rotation = DMat3::from_cols(m.x_axis.as_dvec3(), m.y_axis.as_dvec3(), m.z_axis.as_dvec3());
         Self {
@@ -202,74 +202,74 @@ impl<'a> Placed<'a> {
     }
 
     /// Whether one of the shapes has a round core, so that no few corners make their difference.
-    pub(super) fn is_round(&self) -> bool {
+    pub(crate) fn is_round(&self) -> bool {
         self.round
     }
 
-    pub(super) fn cores(&self) -> &[Core<'a>; 2] {
+    pub(crate) fn cores(&self) -> &[Core<'a>; 2] {
         &self.cores
     }
 
     /// The smaller of the shapes' sizes.
-    pub(super) fn size(&self) -> f64 {
+    pub(crate) fn size(&self) -> f64 {
         let [a, b] = self.shapes.map(Support::size);
         f64::from(if a < b { a } else { b })
     }
 
     /// Whether shape 2 is the smaller one.
-    pub(super) fn is_second_smaller(&self) -> bool {
+    pub(crate) fn is_second_smaller(&self) -> bool {
         let [a, b] = self.shapes.map(Support::size);
         b < a
     }
 
     /// Where shape 2 is.
-    pub(super) fn position(&self) -> DVec3 {
+    pub(crate) fn position(&self) -> DVec3 {
         self.position
     }
 
     /// The closest points, unless the cores are apart by more than `limit` (zero or more) or overlap.
-    pub(super) fn nearness(&self, limit: f64) -> Nearness {
+    pub(crate) fn nearness(&self, limit: f64) -> Nearness {
         self.nearness_by(limit, &mut Simplex::default())
     }
 
     /// As [`Placed::nearness`]; where the cores overlap, `simplex` tells which corners show it.
-    pub(super) fn nearness_by(&self, limit: f64, simplex: &mut Simplex) -> Nearness {
+    pub(crate) fn nearness_by(&self, limit: f64, simplex: &mut Simplex) -> Nearness {
         let start = if self.position.length_squared() == 0.0 { DVec3::X } else { self.position };
         search(self, limit, (start, DVec3::ZERO), simplex)
     }
 
     /// The closest points with shape 2 moved by `way`, if that is enough for a gap.
-    pub(super) fn gap_after(&self, way: DVec3) -> Option<Gap> {
+    pub(crate) fn gap_after(&self, way: DVec3) -> Option<Gap> {
         let nearness = search(self, f64::INFINITY, (way, way), &mut Simplex::default());
         if let Nearness::Gap(gap) = nearness { Some(gap) } else { None }
     }
 
     /// How far the surfaces are from the cores.
-    pub(super) fn radii(&self) -> [f64; 2] {
+    pub(crate) fn radii(&self) -> [f64; 2] {
         self.shapes.map(|shape| shape.radius().into())
     }
 
     /// Puts a point of shape 2 into the frame of shape 1.
-    pub(super) fn place(&self, point: DVec3) -> DVec3 {
+    pub(crate) fn place(&self, point: DVec3) -> DVec3 {
         let m = &self.rotation;
         m.x_axis * point.x + m.y_axis * point.y + m.z_axis * point.z + self.position
     }
 
     /// Turns a direction of shape 2 into the frame of shape 1.
-    pub(super) fn turn(&self, direction: DVec3) -> DVec3 {
+    pub(crate) fn turn(&self, direction: DVec3) -> DVec3 {
         let m = &self.rotation;
         m.x_axis * direction.x + m.y_axis * direction.y + m.z_axis * direction.z
     }
 
     /// Turns a direction of the frame of shape 1 into that of shape 2.
     #[inline]
-    pub(super) fn turn_back(&self, direction: DVec3) -> DVec3 {
+    pub(crate) fn turn_back(&self, direction: DVec3) -> DVec3 {
         let m = &self.rotation;
         DVec3::new(m.x_axis.dot(direction), m.y_axis.dot(direction), m.z_axis.dot(direction))
     }
 
     /// The extreme point of the difference along `direction`.
-    pub(super) fn corner(&self, direction: DVec3) -> Corner {
+    pub(crate) fn corner(&self, direction: DVec3) -> Corner {
         let point1 = self.cores[0].support(-direction);
         let point2 = self.place(self.cores[1].support(self.turn_back(direction)));
         Corner { difference: point2 - point1, point1 }
@@ -278,12 +278,12 @@ impl<'a> Placed<'a> {
 
 impl Simplex {
     /// Its corners.
-    pub(super) fn corners(&self) -> &[Corner] {
+    pub(crate) fn corners(&self) -> &[Corner] {
         &self.corners[..self.count]
     }
 
     /// The last direction, from shape 1 to shape 2, along which a corner was looked for; of any length.
-    pub(super) fn direction(&self) -> DVec3 {
+    pub(crate) fn direction(&self) -> DVec3 {
         self.direction
     }
 
@@ -473,10 +473,10 @@ fn closest_on_tetrahedron(p: &[DVec3; 4], settled: bool) -> Option<Feature> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::{Capsule, Cuboid, Sphere};
     use super::*;
     use crate::math::Rotation;
-    use crate::narrow_phase::tests::Random;
-    use crate::shape::{Capsule, Cuboid, Sphere};
+    use crate::random::Random;
 
     fn gap(a: &Support, b: &Support, pose: &Pose) -> Option<Closest> {
         let found = closest(a, b, pose);

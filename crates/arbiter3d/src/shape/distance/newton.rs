@@ -16,7 +16,7 @@ const ROUNDS: usize = 7;
 const LONGEST_TURN: f64 = 0.7;
 
 /// How the method ends.
-pub(in super::super) enum Settled {
+pub(crate) enum Settled {
     /// The cores are apart by more than was asked for.
     Beyond,
     At {
@@ -34,7 +34,7 @@ pub(in super::super) enum Settled {
 impl Placed<'_> {
     /// Begins with the direction `normal`, shape 2 being moved by `shift`, and ends where `is_settled` for the square
     /// of how far the corner is off the normal and for the height.
-    pub(in super::super) fn settle(
+    pub(crate) fn settle(
         &self,
         mut normal: DVec3,
         shift: DVec3,
@@ -93,7 +93,11 @@ fn turn([k11, k12, k22]: [f64; 3], height: f64, [s1, s2]: [f64; 2]) -> Option<[f
 }
 
 /// Two unit vectors square to a unit vector and to each other.
-pub(in super::super) fn tangents(normal: DVec3) -> [DVec3; 2] {
+///
+/// [`crate::math::tangents`] does the same in single precision, branch-free for the solver's lanes. Any pair serves here, but
+/// that formula in `f64` would give other last bits to contacts of round shapes, and save nothing: what counts is the support
+/// map that is asked between two calls.
+pub(crate) fn tangents(normal: DVec3) -> [DVec3; 2] {
     let axis = if normal.x.abs() > 0.6 { DVec3::Y } else { DVec3::X };
     let first = normal.cross(axis).normalize();
     [first, normal.cross(first)]

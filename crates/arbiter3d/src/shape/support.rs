@@ -1,10 +1,10 @@
 //! Convex shapes as the general algorithms see them: a core, known by its farthest points, grown by a radius.
 
-use crate::math::{Aabb, Pose, Real, Vec3};
-use crate::shape::{
+use super::{
     Capsule, Cone, ConvexHull, Cuboid, Custom, Cylinder, FLAT_SINE, Feature, Geometry, PointCloud, Rounded, Shape,
     Sphere, TaperedCapsule, Transformed, triangle_edge, triangle_feature,
 };
+use crate::math::{Aabb, Pose, Real, Vec3};
 use glam::DVec3;
 
 use super::polyhedron::{CuboidFeatures, Polyhedron};
@@ -313,7 +313,7 @@ fn polyhedron_feature(solid: &Polyhedron<'_>, d: Vec3, out: &mut Feature) {
 }
 
 /// The first of the points that are furthest along `direction`.
-pub(super) fn furthest(points: &[Vec3], direction: DVec3) -> DVec3 {
+pub(crate) fn furthest(points: &[Vec3], direction: DVec3) -> DVec3 {
     let (mut best, mut most) = (DVec3::ZERO, f64::MIN);
     for point in points {
         let point = point.as_dvec3();

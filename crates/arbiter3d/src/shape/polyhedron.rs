@@ -4,8 +4,8 @@
 //! Corner `i` of a cuboid has `x > 0` if bit 0 of `i` is set, `y > 0` for bit 1, `z > 0` for bit 2. Face `2k` looks
 //! down axis `k`, face `2k + 1` up.
 
+use super::{BorderEdge, ConvexHull, CornerGroup, Cuboid, FaceGroup, HalfEdge, LANES, Plane};
 use crate::math::{Real, Vec3, abs3, max, min};
-use crate::shape::{BorderEdge, ConvexHull, CornerGroup, Cuboid, FaceGroup, HalfEdge, LANES, Plane};
 
 /// Corners of each face of a cuboid, counter-clockwise from outside.
 const LOOPS: [[u8; 4]; 6] = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];

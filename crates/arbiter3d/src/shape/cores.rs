@@ -14,8 +14,8 @@
 //! (Blaschke's rolling theorem); for an ellipsoid with half axes `a ≥ b ≥ c` that is `c² / a`.
 
 use super::support::{Support, furthest};
+use super::{ConvexHull, Custom, Transformed};
 use crate::math::Vec3;
-use crate::shape::{ConvexHull, Custom, Transformed};
 use glam::{DMat3, DVec2, DVec3};
 
 /// Where the curvature is not known: by how much directions lean between which it is measured. Farthest points in
@@ -24,7 +24,7 @@ const LEAN: f64 = 1e-2;
 
 /// The core of a convex shape.
 #[derive(Clone, Copy)]
-pub(super) enum Core<'a> {
+pub(crate) enum Core<'a> {
     /// The origin.
     Point,
     /// From `-half_length` to `half_length` on y.
@@ -56,7 +56,7 @@ pub(super) enum Core<'a> {
 
 /// The outward normals of a side that is straight along lines to an apex, or to none: unit vectors with the same `y`.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Belt {
+pub(crate) struct Belt {
     /// Their `y`.
     pub rise: f64,
     /// Height of the side along them.
@@ -73,7 +73,7 @@ pub(crate) struct Ellipsoid {
 }
 
 impl<'a> Core<'a> {
-    pub(super) fn new(support: &Support<'a>) -> Self {
+    pub(crate) fn new(support: &Support<'a>) -> Self {
         match *support {
             Support::Sphere(_) => Self::Point,
             Support::Capsule(s) => Self::Segment(s.half_length().into()),
@@ -103,7 +103,7 @@ impl<'a> Core<'a> {
 
     /// A point that is farthest along `direction`.
     #[inline]
-    pub(super) fn support(&self, direction: DVec3) -> DVec3 {
+    pub(crate) fn support(&self, direction: DVec3) -> DVec3 {
         let sign = |d: f64, h: f64| if d < 0.0 { -h } else { h };
         match self {
             Self::Point => DVec3::ZERO,
@@ -140,7 +140,7 @@ impl<'a> Core<'a> {
     }
 
     /// A point inside.
-    pub(super) fn middle(&self) -> DVec3 {
+    pub(crate) fn middle(&self) -> DVec3 {
         match self {
             Self::Hull(s) => crate::shape::Geometry::inner_ball(*s).0.as_dvec3(),
             Self::Points(points) => points.first().map_or(DVec3::ZERO, |point| point.as_dvec3()),
@@ -155,7 +155,7 @@ impl<'a> Core<'a> {
 
     /// Outward unit normal of the face whose plane a point is highest over, with the plane's distance from the origin;
     /// `None` if some round side is nearer, or no face is known.
-    pub(super) fn face_towards(&self, point: DVec3) -> Option<(DVec3, f64)> {
+    pub(crate) fn face_towards(&self, point: DVec3) -> Option<(DVec3, f64)> {
         match self {
             Self::Cuboid(h) => {
                 let over = point.abs() - *h;
@@ -188,7 +188,7 @@ impl<'a> Core<'a> {
     }
 
     /// The normals of the round side.
-    pub(super) fn belt(&self) -> Option<Belt> {
+    pub(crate) fn belt(&self) -> Option<Belt> {
         match self {
             Self::Segment(_) => Some(Belt { rise: 0.0, offset: 0.0 }),
             Self::Cylinder { radius, .. } => Some(Belt { rise: 0.0, offset: *radius }),
@@ -206,7 +206,7 @@ impl<'a> Core<'a> {
 
     /// Radius of a ball around a point that fits inside, as large as is known in closed form; negative outside or where
     /// nothing is known. `touching` is the point of the boundary that is farthest along the unit vector `normal`.
-    pub(super) fn inner_depth(&self, point: DVec3, touching: DVec3, normal: DVec3) -> f64 {
+    pub(crate) fn inner_depth(&self, point: DVec3, touching: DVec3, normal: DVec3) -> f64 {
         match self {
             Self::Cuboid(h) => {
                 let inside = *h - point.abs();
@@ -234,7 +234,7 @@ impl<'a> Core<'a> {
 
     /// Second derivatives of the support function along two tangents of the unit vector `normal`: both along the first,
     /// mixed, both along the second. `None` where they are endless. `touching` is the point farthest along `normal`.
-    pub(super) fn curvature(&self, touching: DVec3, normal: DVec3, [t1, t2]: [DVec3; 2]) -> Option<[f64; 3]> {
+    pub(crate) fn curvature(&self, touching: DVec3, normal: DVec3, [t1, t2]: [DVec3; 2]) -> Option<[f64; 3]> {
         let ring = |radius: f64| {
             let across = (normal.x * normal.x + normal.z * normal.z).sqrt();
             if across <= 0.0 {
@@ -295,7 +295,7 @@ impl Ellipsoid {
     }
 }
 
-pub(super) fn smaller(a: f64, b: f64) -> f64 {
+pub(crate) fn smaller(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }
 }
 
