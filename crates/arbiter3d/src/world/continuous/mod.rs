@@ -552,7 +552,7 @@ impl ImpactSearch<'_> {
             Shape::HalfSpace(_) => {
                 // All of it that is within reach: a block with its top at height zero.
                 let around = mover.around(2.0 * self.settings.slop);
-                let half = around.half_extents().max_element() + around.min.y.abs() + 1.0;
+                let half = around.half_extents().max_element() + around.min.y.abs();
                 let middle = Vec3::new(around.center().x, -half, around.center().z);
                 let block = Cuboid::new(Vec3::splat(half)).ok()?;
                 self.impact(&Support::Cuboid(block), &mover.relative_to(&[Pose::from_position(middle); 2]))
