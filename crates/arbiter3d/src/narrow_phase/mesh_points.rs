@@ -307,7 +307,8 @@ impl Candidates {
             if mask >> group & 1 == 0 {
                 continue;
             }
-            let gain = gain(&corners[group][..chosen.counts[group]], candidate.position, groups.normal(group));
+            let corners = &corners[group][..chosen.counts[group]];
+            let gain = gain(corners, candidate.position, groups.normal(group), self.tolerance);
             if gain > most[0] * TIE && candidate.separation <= limit {
                 (most[0], near) = (gain, Some((group, i, gain)));
             }
@@ -364,14 +365,18 @@ impl Chosen {
 }
 
 /// What a point adds to those of its group: square of the distance, twice the area of the triangle, twice the area outside
-/// it.
-fn gain(corners: &[Vec3], point: Vec3, normal: Vec3) -> Real {
+/// it; nothing if it is within a tolerance of a line through two of them: what lies on a line bears with its ends.
+fn gain(corners: &[Vec3], point: Vec3, normal: Vec3, tolerance: Real) -> Real {
+    let beyond = |p: Vec3, q: Vec3| {
+        let (along, area) = (q - p, normal.dot((q - p).cross(point - p)));
+        if area * area > tolerance * tolerance * along.length_squared() { area } else { 0.0 }
+    };
     match *corners {
         [a] => (point - a).length_squared(),
-        [a, b] => normal.dot((b - a).cross(point - a)).abs(),
+        [a, b] => beyond(a, b).abs(),
         [a, b, c] => {
             let turn = if normal.dot((b - a).cross(c - a)) < 0.0 { -1.0 } else { 1.0 };
-            let outside = |p: Vec3, q: Vec3| -turn * normal.dot((q - p).cross(point - p));
+            let outside = |p: Vec3, q: Vec3| -turn * beyond(p, q);
             max(max(outside(a, b), outside(b, c)), outside(c, a))
         }
         _ => 0.0,

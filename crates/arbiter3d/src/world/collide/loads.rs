@@ -1,4 +1,8 @@
-//! Loads that several shapes bear together: of a body on a floor of many shapes, in one piece from step to step.
+//! Loads that several shapes bear together: of a body on a floor of many shapes, as of one floor.
+//!
+//! Where the parts of the patch on which a body bears meet, at a seam, two shapes give two points each that one floor would not
+//! give. They push as springs do: with them, a can on two shapes leans towards where there are fewer, and rolls in a curve. So
+//! of all points that touch and push one way, those are left out that are within the convex outline of the others, or on it.
 //!
 //! What rolls or slides from one such shape to the next is borne by other points in each step, of other arbiters. Their impulses
 //! of the last step, with which the solver begins, would be those of points that are no more: for a moment one end of a can has
@@ -13,10 +17,12 @@
 //!
 //! Of bodies with points that several directions push, and of those that have sunk in, each arbiter keeps what is its own.
 
+use super::super::definition::BodyKind;
+use super::super::pairs::Pair;
 use super::contacts::GOES_ON;
 use super::seams::{SeamSearch, own_slots};
 use crate::arbiter::{Contact, ContactData, HIDDEN, NONE, SLOTS};
-use crate::math::{Real, Vec3, max, tangents};
+use crate::math::{Real, Vec3, clamp, max, min, tangents};
 use crate::storage::FixedList;
 
 /// Points that share a load; what rests on more keeps it as it is.
@@ -25,6 +31,8 @@ const MOST: usize = 64;
 const TOUCHING: Real = 0.02;
 /// Times that points which would pull are left out.
 const ROUNDS: usize = 4;
+/// Points that are outside the outline of the others by no more than this share of the slop are on it.
+const ON_OUTLINE: Real = 0.02;
 /// Points on a line get a width of this share of its length (squared), so that all moments have an answer.
 const WIDTH: Real = 1e-4;
 
@@ -53,6 +61,7 @@ struct Bearer {
     /// Handed on by the contact that it goes on from.
     kept: Real,
     impulse: Real,
+    separation: Real,
     pulls: bool,
 }
 
@@ -103,6 +112,7 @@ impl SeamSearch<'_> {
         if !self.list_bearers(load, &mut points) || points.as_slice().is_empty() {
             return;
         }
+        self.keep_outline(load.body, &mut points);
         share(load, points.as_mut_slice());
         for point in points.as_slice() {
             // SAFETY: an arbiter with a fixed body belongs to its other body, which one thread looks at.
@@ -133,11 +143,52 @@ impl SeamSearch<'_> {
                 if along && contact.separation <= TOUCHING * self.slop {
                     let lever = [lever.dot(t1), lever.dot(t2)];
                     let kept = contact.normal_impulse;
-                    points.push(Bearer { arbiter: pair.arbiter, slot, lever, kept, impulse: kept, pulls: false });
+                    points.push(Bearer {
+                        arbiter: pair.arbiter,
+                        slot,
+                        lever,
+                        kept,
+                        impulse: kept,
+                        separation: contact.separation,
+                        pulls: false,
+                    });
                 }
             }
         }
         true
+    }
+
+    /// Leaves out the points of several arbiters that are not needed beside the others.
+    fn keep_outline(&self, body: u32, points: &mut FixedList<Bearer, MOST>) {
+        let list = points.as_mut_slice();
+        if list.iter().all(|point| point.arbiter == list[0].arbiter) {
+            return;
+        }
+        let width = ON_OUTLINE * self.slop;
+        let mut needed = outline(list, width);
+        let outer = |place: usize| needed >> place & 1 == 1;
+        let deepest = (0..list.len()).filter(|&place| outer(place)).fold(Real::MAX, |m, i| min(list[i].separation, m));
+        for (place, point) in list.iter().enumerate() {
+            needed |= u64::from(point.separation < deepest - TOUCHING * self.slop) << place;
+        }
+        let moves = |(_, pair, side): (u32, &Pair, usize)| self.bodies[pair.bodies[side] as usize].kind == BodyKind::Kinematic;
+        let again = self.fixed_pairs(body).any(moves);
+        let mut kept = 0;
+        for place in 0..list.len() {
+            let point = list[place];
+            if needed >> place & 1 == 1 {
+                list[kept] = point;
+                kept += 1;
+                continue;
+            }
+            // SAFETY: an arbiter with a fixed body belongs to its other body, which one thread looks at, and so does its pair.
+            unsafe {
+                let arbiter = self.arbiters.get_mut(point.arbiter as usize);
+                leave_out(&mut arbiter.data, point.slot);
+                self.pairs.get_mut(arbiter.pair as usize).has_manifold &= !again;
+            }
+        }
+        points.truncate(kept);
     }
 
     /// Shares friction among the arbiters as the load is shared.
@@ -176,6 +227,84 @@ impl SeamSearch<'_> {
             }
         }
     }
+}
+
+/// Takes a contact from an arbiter; one that has no others keeps it and is not solved.
+fn leave_out(data: &mut ContactData, slot: usize) {
+    data.slots[slot].reset_impulses();
+    if data.usage_mask & 15 == 1 << slot {
+        data.flags |= HIDDEN;
+    } else {
+        data.usage_mask &= !(1 << slot);
+    }
+}
+
+/// The points that are corners of the outline of all by more than `width`: a bit for each.
+fn outline(points: &[Bearer], width: Real) -> u64 {
+    let mut ring = FixedList::<usize, MOST>::new();
+    hull(points, &mut ring);
+    let ring = ring.as_mut_slice();
+    let mut count = ring.len();
+    while count > 1 {
+        // Of the corners near the way between their neighbours, the one that bears least goes.
+        let (mut least, mut place) = (Real::MAX, MOST);
+        for k in 0..count {
+            let [before, corner, after] = [k + count - 1, k, k + 1].map(|k| &points[ring[k % count]]);
+            if corner.kept < least && distance(before.lever, after.lever, corner.lever) <= width {
+                (least, place) = (corner.kept, k);
+            }
+        }
+        if place == MOST {
+            break;
+        }
+        ring.copy_within(place + 1..count, place);
+        count -= 1;
+    }
+    ring[..count].iter().fold(0, |mask, &place| mask | 1 << place)
+}
+
+/// How far a point is from the way between two others.
+fn distance(a: [Real; 2], b: [Real; 2], point: [Real; 2]) -> Real {
+    let (along, way) = ([b[0] - a[0], b[1] - a[1]], [point[0] - a[0], point[1] - a[1]]);
+    let squared = along[0] * along[0] + along[1] * along[1];
+    let share = if squared > 0.0 { (along[0] * way[0] + along[1] * way[1]) / squared } else { 0.0 };
+    let share = clamp(share, 0.0, 1.0);
+    let (x, y) = (way[0] - along[0] * share, way[1] - along[1] * share);
+    (x * x + y * y).sqrt()
+}
+
+/// Whether a point is to the right of the way from `a` to `b`.
+fn is_right(a: [Real; 2], b: [Real; 2], point: [Real; 2]) -> bool {
+    (b[1] - a[1]) * (point[0] - a[0]) - (b[0] - a[0]) * (point[1] - a[1]) > 0.0
+}
+
+/// The corners of the convex hull of some points, counter-clockwise: Andrew's monotone chain.
+fn hull(points: &[Bearer], ring: &mut FixedList<usize, MOST>) {
+    let mut order = FixedList::<usize, MOST>::new();
+    (0..points.len()).for_each(|place| order.push(place));
+    let order = order.as_mut_slice();
+    let before = |&a: &usize, &b: &usize| {
+        let ([ax, ay], [bx, by]) = (points[a].lever, points[b].lever);
+        ax.total_cmp(&bx).then(ay.total_cmp(&by)).then(a.cmp(&b))
+    };
+    order.sort_unstable_by(before);
+    let mut chain = |places: &mut dyn Iterator<Item = usize>| {
+        let first = ring.as_slice().len();
+        for place in places {
+            while let [.., a, b] = ring.as_slice()[first..]
+                && !is_right(points[a].lever, points[place].lever, points[b].lever)
+            {
+                ring.truncate(ring.as_slice().len() - 1);
+            }
+            if ring.as_slice().len() < MOST {
+                ring.push(place);
+            }
+        }
+        // The end of one chain begins the other.
+        ring.truncate(ring.as_slice().len() - 1);
+    };
+    chain(&mut order.iter().copied());
+    chain(&mut order.iter().rev().copied());
 }
 
 /// What one arbiter bears.
