@@ -154,7 +154,7 @@ impl Touch {
         }
     }
 
-    /// What the features share, or where that is no more than a point, the edges with them or with each other. Edges that both
+    /// What the features share, or where that is no more than a point, the edges with them or with each other. Lines that both
     /// lie beside a face whose normal this is do not meet along it.
     fn widest_patch(
         &self,
@@ -167,9 +167,9 @@ impl Touch {
         let mut patch = self.patch(placed, (feature1, feature2), (margin, size));
         if patch.count < 2 {
             let (edge1, edge2) = features.edges();
-            let pairs = [(&edge1, feature2), (feature1, &edge2), (&edge1, &edge2)];
-            for pair in pairs.into_iter().take(if leant { 2 } else { 3 }) {
-                if pair.0.points().len() > 1 && pair.1.points().len() > 1 {
+            for pair in [(&edge1, feature2), (feature1, &edge2), (&edge1, &edge2)] {
+                let corners = [pair.0.points().len(), pair.1.points().len()];
+                if corners[0] > 1 && corners[1] > 1 && (!leant || corners[0].max(corners[1]) > 2) {
                     let other = self.patch(placed, pair, (margin, size));
                     if other.count > patch.count && other.lowest <= self.separation + MISSED * size {
                         patch = other;
