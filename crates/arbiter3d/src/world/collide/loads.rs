@@ -171,7 +171,8 @@ impl SeamSearch<'_> {
         for (place, point) in list.iter().enumerate() {
             needed |= u64::from(point.separation < deepest - TOUCHING * self.slop) << place;
         }
-        let moves = |(_, pair, side): (u32, &Pair, usize)| self.bodies[pair.bodies[side] as usize].kind == BodyKind::Kinematic;
+        let moves =
+            |(_, pair, side): (u32, &Pair, usize)| self.bodies[pair.bodies[side] as usize].kind == BodyKind::Kinematic;
         let again = self.fixed_pairs(body).any(moves);
         let mut kept = 0;
         for place in 0..list.len() {

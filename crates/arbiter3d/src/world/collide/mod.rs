@@ -200,7 +200,7 @@ impl World {
         }
         let (search, awake, bearings, _) = self.seam_search();
         let several = || awake.iter().filter(|&&body| bearings[body as usize] > 1);
-        storage::reserve(loads, several().count());
+        storage::reserve(loads, awake.len());
         loads.extend(several().filter_map(|&body| search.load_of(body)));
         loads.sort_unstable_by_key(|load| load.body);
     }
