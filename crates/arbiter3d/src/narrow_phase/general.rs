@@ -52,31 +52,52 @@ pub(crate) fn collide((shape1, shape2): (&Shape, &Shape), pose: &Pose, margin: R
     let (Some(support1), Some(support2)) = (Support::new(shape1), Support::new(shape2)) else { return };
     let placed = Placed::new(&support1, &support2, pose);
     let Some(mut touch) = Touch::find(&placed, margin) else { return };
-    let (size1, size2) = (support1.size(), support2.size());
-    let (mut feature1, mut feature2) = (Feature::default(), Feature::default());
-    let normal2 = -pose.rotation.inverse_rotate(touch.normal);
-    support1.feature(touch.normal, &mut feature1);
-    support2.feature(normal2, &mut feature2);
-    let size = min(size1, size2);
-    touch.lean_on_face(&placed, (&feature1, &feature2), size);
+    let size = min(support1.size(), support2.size());
+    let nearest = touch;
+    let mut features = Features::along(touch.normal, (&support1, &support2), pose);
+    touch.lean_on_face(&placed, (&features.first, &features.second), size);
     if touch.separation > margin {
         return;
     }
-    let mut patch = touch.patch(&placed, (&feature1, &feature2), (margin, size));
-    if patch.count < 2 {
-        let (mut edge1, mut edge2) = (Feature::default(), Feature::default());
-        support1.edge(touch.normal, &mut edge1);
-        support2.edge(normal2, &mut edge2);
-        for pair in [(&edge1, &feature2), (&feature1, &edge2), (&edge1, &edge2)] {
-            if pair.0.points().len() > 1 && pair.1.points().len() > 1 {
-                let other = touch.patch(&placed, pair, (margin, size));
-                if other.count > patch.count && other.lowest <= touch.separation + MISSED * size {
-                    patch = other;
-                }
-            }
-        }
+    let leant = touch.normal != nearest.normal;
+    if leant {
+        features = Features::along(touch.normal, (&support1, &support2), pose);
+    }
+    let mut patch = touch.widest_patch(&placed, &features, (margin, size), leant);
+    if leant && patch.count == 0 {
+        // What is lowest over the face is beside it: an edge of the face touches, along the normal that was found.
+        touch = nearest;
+        features = Features::along(touch.normal, (&support1, &support2), pose);
+        patch = touch.widest_patch(&placed, &features, (margin, size), false);
     }
     touch.hand_on(&placed, &patch, size, manifold);
+}
+
+/// What of two shapes lies most along a normal, each in its own frame.
+struct Features<'a> {
+    first: Feature,
+    second: Feature,
+    supports: (&'a Support<'a>, &'a Support<'a>),
+    /// Towards shape 1 in the frame of shape 2.
+    normals: [Vec3; 2],
+}
+
+impl<'a> Features<'a> {
+    fn along(normal: Vec3, supports: (&'a Support<'a>, &'a Support<'a>), pose: &Pose) -> Self {
+        let normals = [normal, -pose.rotation.inverse_rotate(normal)];
+        let (mut first, mut second) = (Feature::default(), Feature::default());
+        supports.0.feature(normals[0], &mut first);
+        supports.1.feature(normals[1], &mut second);
+        Self { first, second, supports, normals }
+    }
+
+    /// The edges that lie most level to the normal.
+    fn edges(&self) -> (Feature, Feature) {
+        let (mut first, mut second) = (Feature::default(), Feature::default());
+        self.supports.0.edge(self.normals[0], &mut first);
+        self.supports.1.edge(self.normals[1], &mut second);
+        (first, second)
+    }
 }
 
 /// Where the figures of two features overlap within the margin.
@@ -131,6 +152,32 @@ impl Touch {
                 (self.normal, self.separation) = (normal.as_vec3(), gap as Real);
             }
         }
+    }
+
+    /// What the features share, or where that is no more than a point, the edges with them or with each other. Lines that both
+    /// lie beside a face whose normal this is do not meet along it.
+    fn widest_patch(
+        &self,
+        placed: &Placed<'_>,
+        features: &Features<'_>,
+        (margin, size): (Real, Real),
+        leant: bool,
+    ) -> Patch {
+        let (feature1, feature2) = (&features.first, &features.second);
+        let mut patch = self.patch(placed, (feature1, feature2), (margin, size));
+        if patch.count < 2 {
+            let (edge1, edge2) = features.edges();
+            for pair in [(&edge1, feature2), (feature1, &edge2), (&edge1, &edge2)] {
+                let corners = [pair.0.points().len(), pair.1.points().len()];
+                if corners[0] > 1 && corners[1] > 1 && (!leant || corners[0].max(corners[1]) > 2) {
+                    let other = self.patch(placed, pair, (margin, size));
+                    if other.count > patch.count && other.lowest <= self.separation + MISSED * size {
+                        patch = other;
+                    }
+                }
+            }
+        }
+        patch
     }
 
     /// What two features, each in the frame of its shape, share.

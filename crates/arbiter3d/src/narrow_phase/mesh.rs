@@ -10,7 +10,7 @@
 //! Nothing is lost between neighbours: a triangle may leave a contact to the neighbour that reaches further, but
 //! if no triangle then reports a touch although some overlap the shape, they are looked at again and push along their faces.
 
-use super::mesh_points::{Candidate, Candidates, NO_FACET};
+use super::mesh_points::{Candidate, Candidates};
 use super::triangle::{Frame, Group, Reach, Solid};
 use super::triangle_general::General;
 use super::triangle_lanes::Near;
@@ -141,7 +141,7 @@ fn point_in_mesh(mesh: Surface<'_>, frame: &Frame, candidate: &Candidate) -> Man
     let turned = frame.rotation * candidate.normal;
     let (separation, feature) = (candidate.separation, candidate.feature);
     let point1 = frame.rotation * candidate.position + frame.position;
-    if candidate.facet == NO_FACET {
+    if !candidate.is_on_face() {
         return ManifoldPoint { point1, normal: turned * (1.0 / turned.length()), separation, feature };
     }
     let normal: Vec3 = mesh.facet(candidate.facet as usize).normal();

@@ -14,6 +14,8 @@ use crate::storage::FixedList;
 
 /// The normal of a point is not that of a triangle.
 pub(super) const NO_FACET: u32 = u32::MAX;
+/// Neither is it, and what touches is round there: a point or a line of it bears, and moves on as it rolls.
+pub(super) const ROLLING: u32 = u32::MAX - 1;
 
 /// A contact point, in the frame of the convex shape.
 #[derive(Clone, Copy, Debug)]
@@ -24,10 +26,18 @@ pub(super) struct Candidate {
     pub(super) normal: Vec3,
     pub(super) separation: Real,
     pub(super) feature: u32,
-    /// Internal number of the triangle whose normal this is (on either side of it), or [`NO_FACET`].
+    /// Internal number of the triangle whose normal this is (on either side of it), [`NO_FACET`] or
+    /// [`ROLLING`].
     pub(super) facet: u32,
     /// Internal number of the triangle that touches.
     pub(super) triangle: u32,
+}
+
+impl Candidate {
+    /// Whether its normal is that of a triangle.
+    pub(super) fn is_on_face(&self) -> bool {
+        self.facet < ROLLING
+    }
 }
 
 /// A number for a corner by where it is: the same from step to step, whichever triangle brings it.
@@ -193,12 +203,14 @@ impl Candidates {
         if list.iter().all(|c| c.normal == first) {
             return;
         }
+        self.drop_points_beside_faces();
+        let list = self.list.as_mut_slice();
         let mut leaders = [0_u8; CAPACITY];
         let mut count = 0;
         for faces in [true, false] {
             for i in 0..list.len() {
                 let candidate = list[i];
-                if (candidate.facet != NO_FACET) != faces {
+                if candidate.is_on_face() != faces {
                     continue;
                 }
                 let same = |&&leader: &&u8| list[leader as usize].normal.dot(candidate.normal) > SAME_NORMAL;
@@ -212,6 +224,24 @@ impl Candidates {
                 }
             }
         }
+    }
+
+    /// Drops points at edges and corners, beside a face, of what rolls on that face: they are as deep as the face or less, only
+    /// by a hair aside of what bears, where the next moment presses it into them.
+    fn drop_points_beside_faces(&mut self) {
+        let mut kept = 0;
+        for i in 0..self.list.as_slice().len() {
+            let list = self.list.as_slice();
+            let point = list[i];
+            let limit = point.separation + EQUALLY_DEEP * self.tolerance;
+            let bears =
+                |c: &Candidate| c.is_on_face() && c.separation <= limit && c.normal.dot(point.normal) > SAME_NORMAL;
+            if point.facet != ROLLING || !list.iter().any(bears) {
+                self.list.as_mut_slice()[kept] = point;
+                kept += 1;
+            }
+        }
+        self.list.truncate(kept);
     }
 
     /// Groups the points by normal into at most `limit` groups.
@@ -277,7 +307,8 @@ impl Candidates {
             if mask >> group & 1 == 0 {
                 continue;
             }
-            let gain = gain(&corners[group][..chosen.counts[group]], candidate.position, groups.normal(group));
+            let corners = &corners[group][..chosen.counts[group]];
+            let gain = gain(corners, candidate.position, groups.normal(group), self.tolerance);
             if gain > most[0] * TIE && candidate.separation <= limit {
                 (most[0], near) = (gain, Some((group, i, gain)));
             }
@@ -334,14 +365,18 @@ impl Chosen {
 }
 
 /// What a point adds to those of its group: square of the distance, twice the area of the triangle, twice the area outside
-/// it.
-fn gain(corners: &[Vec3], point: Vec3, normal: Vec3) -> Real {
+/// it; nothing if it is within a tolerance of a line through two of them: what lies on a line bears with its ends.
+fn gain(corners: &[Vec3], point: Vec3, normal: Vec3, tolerance: Real) -> Real {
+    let beyond = |p: Vec3, q: Vec3| {
+        let (along, area) = (q - p, normal.dot((q - p).cross(point - p)));
+        if area * area > tolerance * tolerance * along.length_squared() { area } else { 0.0 }
+    };
     match *corners {
         [a] => (point - a).length_squared(),
-        [a, b] => normal.dot((b - a).cross(point - a)).abs(),
+        [a, b] => beyond(a, b).abs(),
         [a, b, c] => {
             let turn = if normal.dot((b - a).cross(c - a)) < 0.0 { -1.0 } else { 1.0 };
-            let outside = |p: Vec3, q: Vec3| -turn * normal.dot((q - p).cross(point - p));
+            let outside = |p: Vec3, q: Vec3| -turn * beyond(p, q);
             max(max(outside(a, b), outside(b, c)), outside(c, a))
         }
         _ => 0.0,

@@ -6,7 +6,7 @@
 //! corner where the whole surface has a summit in that direction (see `mesh_edges`). A sphere on a seam therefore touches
 //! the face beside it, with the plane's own distance, and never the edge: seams inside a surface are not felt.
 
-use super::mesh_points::{Candidate, Candidates, NO_FACET};
+use super::mesh_points::{Candidate, Candidates, NO_FACET, ROLLING};
 use super::triangle_lanes::{Near, Planes};
 use crate::math::{Aabb, Mat3, Real, Vec3, abs3, clamp, max, max3, min, min3};
 use crate::shape::{Capsule, Facet, LEAF as LANES, Sphere, Surface, Surroundings};
@@ -233,6 +233,11 @@ impl<'a> Triangle<'a> {
     pub(super) fn rim_candidate(&self, position: Vec3, normal: Vec3, separation: Real, feature: u32) -> Candidate {
         let feature = feature_id(self.around.id, feature);
         Candidate { position, normal, separation, feature, facet: NO_FACET, triangle: self.index }
+    }
+
+    /// The same of what is round there.
+    pub(super) fn rolling_candidate(&self, position: Vec3, normal: Vec3, separation: Real, feature: u32) -> Candidate {
+        Candidate { facet: ROLLING, ..self.rim_candidate(position, normal, separation, feature) }
     }
 }
 
@@ -512,11 +517,11 @@ impl Capsule {
             for (k, (on_edge, on_axis)) in ends.into_iter().enumerate() {
                 let separation = normal.dot(on_axis - on_edge) - self.radius();
                 if separation <= reach.margin {
-                    out.push(triangle.rim_candidate(on_edge, normal, separation, feature + 1 + k as u32));
+                    out.push(triangle.rolling_candidate(on_edge, normal, separation, feature + 1 + k as u32));
                 }
             }
         } else {
-            out.push(triangle.rim_candidate(pair.on_first, normal, distance - self.radius(), feature));
+            out.push(triangle.rolling_candidate(pair.on_first, normal, distance - self.radius(), feature));
         }
         true
     }

@@ -12,7 +12,7 @@ use super::mesh_points::Candidates;
 use super::triangle::{Frame, Group, Reach, Solid, Triangle};
 use super::triangle_lanes::{BACKWARD, Near, Planes};
 use super::{Manifold, ManifoldPoint};
-use crate::math::{Aabb, Pose, Real, Vec3, max};
+use crate::math::{Aabb, Pose, Real, Vec3, clamp, max};
 use crate::shape::Support;
 use crate::shape::distance::Placed;
 use crate::shape::{Feature, LEAF as LANES, Surface};
@@ -27,6 +27,8 @@ const SEAM_SINE: Real = 2e-3;
 const SHALLOW: Real = 0.5;
 /// A feature lies along the triangle below this sine (3°): all of it bears although another axis overlaps less.
 const FLAT_SINE: Real = 0.05;
+/// What bears is near a point up to this share of the size.
+const BESIDE: Real = 0.1;
 /// Its points count unless they are deeper than the overlap by this share of the scale.
 const EXTRA_DEPTH: Real = 0.25;
 /// The triangle's face wins unless another axis is better by this share of the scale.
@@ -60,6 +62,27 @@ impl<'a> General<'a> {
             self.below = Feature::default();
             self.support.feature(-normal, &mut self.below);
         }
+    }
+
+    /// Whether what is lowest is no more than a line.
+    fn rolls(&self) -> bool {
+        self.below.points().len() < 3
+    }
+
+    /// The lowest point nearest to another one, if it is near; of what rolls: a hair ahead of what bears, the next moment
+    /// would press it into the triangle.
+    fn bearing_point(&self, point: Vec3) -> Vec3 {
+        let nearest = match *self.below.points() {
+            [a] => a,
+            [a, b] => {
+                let along = b - a;
+                a + along * clamp((point - a).dot(along) / along.length_squared(), 0.0, 1.0)
+            }
+            _ => return point,
+        };
+        let aside = nearest - point;
+        let aside = aside - self.normal * aside.dot(self.normal);
+        if aside.length_squared() < BESIDE * BESIDE * self.size * self.size { point + aside } else { point }
     }
 
     fn touch(&mut self, triangle: &Triangle, reach: &Reach, out: &mut Candidates) -> bool {
@@ -344,7 +367,11 @@ impl Pair<'_> {
         touch.hand_on(placed, &patch, self.shape.size, &mut manifold);
         for &ManifoldPoint { point1, normal, separation, feature } in manifold.points() {
             let feature = RIM + ((number as u32) << 24 ^ feature);
-            out.push(self.triangle.rim_candidate(point1, normal, separation, feature));
+            out.push(if self.shape.rolls() {
+                self.triangle.rolling_candidate(point1, normal, separation, feature)
+            } else {
+                self.triangle.rim_candidate(point1, normal, separation, feature)
+            });
         }
         manifold.points().len()
     }
@@ -354,7 +381,7 @@ impl Pair<'_> {
     fn push_out(&self, touch: &Touch, out: &mut Candidates) {
         let cosine = max(touch.normal.dot(self.triangle.normal), 0.1);
         let depth = max(touch.separation / cosine, self.height);
-        let point = touch.point1.as_vec3() + self.triangle.normal * depth;
+        let point = self.shape.bearing_point(touch.point1.as_vec3()) + self.triangle.normal * depth;
         out.push(self.triangle.face_candidate(point, depth, 0.0, WITNESS));
     }
 }

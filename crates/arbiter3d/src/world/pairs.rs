@@ -410,7 +410,8 @@ impl World {
     fn drop_pair(&mut self, index: u32, reason: EndReason) {
         let pair = &self.pairs[index as usize];
         let (shapes, bodies, arbiter, overlapping) = (pair.shapes, pair.bodies, pair.arbiter, pair.overlapping);
-        if let Some(body) = pair.borne() {
+        let borne = pair.borne();
+        if let Some(body) = borne {
             self.bearings[body as usize] -= 1;
         }
         if arbiter != NONE {
@@ -424,6 +425,12 @@ impl World {
         self.pair_set.remove(shapes[0], shapes[1]);
         self.pairs[index as usize].alive = false;
         self.free_pairs.push(index);
+        if let Some(body) = borne.filter(|_| arbiter != NONE) {
+            // Contacts that this one made needless are looked for again.
+            for other in self.pair_lists.of_body(body) {
+                self.pairs[other as usize].has_manifold = false;
+            }
+        }
     }
 
     /// The pairs of a body.

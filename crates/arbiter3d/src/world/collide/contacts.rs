@@ -16,7 +16,7 @@ use crate::simd::{LanePose, LaneRotation, LaneVec3, Lanes, Number, Quad};
 use crate::solver::SolverBodies;
 
 /// Least cosine between normals of points of which one takes over the load of another.
-const GOES_ON: Real = 0.99;
+pub(super) const GOES_ON: Real = 0.99;
 
 /// Where a contact is: what a new manifold changes of it.
 #[derive(Clone, Copy, Debug)]

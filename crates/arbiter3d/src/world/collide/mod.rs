@@ -12,6 +12,7 @@
 
 mod block;
 mod contacts;
+mod loads;
 mod seams;
 
 use super::World;
@@ -25,7 +26,7 @@ use crate::arbiter::{Arbiter, ArbiterId, ArbiterKey, ContactData, NONE, Name};
 use crate::id::BodyId;
 use crate::math::Real;
 use crate::narrow_phase::{Manifold, collide};
-use crate::parallel::{Gather, SharedSlice};
+use crate::parallel::{Gather, SharedSlice, StagePool};
 #[cfg(target_arch = "x86_64")]
 use crate::simd::{Avx2, Avx2Lanes, Avx512, Avx512Lanes, Sse2Lanes};
 use crate::simd::{Baseline, Instructions, Lanes, SimdLevel, Wide};
@@ -33,6 +34,7 @@ use crate::solver::{BodyMass, SolverBodies};
 use crate::storage;
 use block::{BlockKernel, PAIRS_PER_BLOCK, WORDS_PER_BLOCK};
 use contacts::{Places, update_contacts};
+use loads::Load;
 use seams::SeamSearch;
 use std::marker::PhantomData;
 
@@ -94,6 +96,8 @@ pub(crate) struct NarrowPhaseScratch {
     sensors: Vec<(u32, bool)>,
     /// Bodies with new contacts against what nothing can push.
     borne: Vec<u32>,
+    /// What bodies by several things that nothing can push were borne with in the last step, by body.
+    loads: Vec<Load>,
     /// Arbiters that may have nothing left.
     pub empty: Vec<u32>,
 }
@@ -108,6 +112,7 @@ impl World {
         for list in [&mut scratch.borne, &mut scratch.empty, &mut scratch.apart] {
             crate::storage::reserve(list, PAIRS_PER_BLOCK);
         }
+        self.add_up_loads(&mut scratch.loads);
         scratch.blocks.clear();
         self.events.watched_pairs.clear();
         let blocks = self.active_pairs.words().chunks(WORDS_PER_BLOCK).enumerate();
@@ -147,7 +152,7 @@ impl World {
         scratch.apart.clear();
         scratch.empty.retain(|&index| self.arbiters.at(index).alive);
         self.begin_pairs(scratch.begins.list(), &mut scratch.begin_order);
-        self.hide_seams(&mut scratch.borne);
+        self.hide_seams(&mut scratch.borne, &scratch.loads);
         self.narrow = scratch;
     }
 
@@ -187,13 +192,33 @@ impl World {
         });
     }
 
-    /// Leaves contacts at seams between shapes that nothing can push out of the solve.
-    fn hide_seams(&mut self, bodies: &mut Vec<u32>) {
+    /// Adds up the loads of bodies that several things bear which nothing can push.
+    fn add_up_loads(&mut self, loads: &mut Vec<Load>) {
+        loads.clear();
+        if self.bearings.iter().all(|&count| count < 2) {
+            return;
+        }
+        let (search, awake, bearings, _) = self.seam_search();
+        let several = || awake.iter().filter(|&&body| bearings[body as usize] > 1);
+        storage::reserve(loads, awake.len());
+        loads.extend(several().filter_map(|&body| search.load_of(body)));
+        loads.sort_unstable_by_key(|load| load.body);
+    }
+
+    /// Leaves contacts at seams between shapes that nothing can push out of the solve, and hands on loads.
+    fn hide_seams(&mut self, bodies: &mut Vec<u32>, loads: &[Load]) {
         if bodies.is_empty() {
             return;
         }
         bodies.sort_unstable();
         bodies.dedup();
+        let (search, _, _, pool) = self.seam_search();
+        search.run(bodies, loads, pool);
+        bodies.clear();
+    }
+
+    /// Also which bodies are awake, how many things by them nothing can push, and the threads.
+    fn seam_search(&mut self) -> (SeamSearch<'_>, &[u32], &[u32], &mut StagePool) {
         let search = SeamSearch {
             shapes: &self.shapes,
             bodies: &self.bodies,
@@ -202,9 +227,9 @@ impl World {
             pairs: SharedSlice::new(&mut self.pairs),
             arbiters: SharedSlice::new(self.arbiters.slots_mut()),
             slop: self.scaled.slop,
+            break_distance: self.scaled.contact_break_distance,
         };
-        search.run(bodies, &mut self.pool);
-        bodies.clear();
+        (search, &self.awake, &self.bearings, &mut self.pool)
     }
 
     /// Makes the arbiters of the pairs that begin to touch, by key.

@@ -12,6 +12,7 @@
 use super::super::bodies::Body;
 use super::super::pairs::Pair;
 use super::super::shapes::ShapeSlot;
+use super::loads::Load;
 use crate::arbiter::{Arbiter, ContactData, HIDDEN, NONE, ONE_NORMAL, SLOTS};
 use crate::edge_lists::EdgeLists;
 use crate::math::{Pose, Real, Vec3};
@@ -37,6 +38,7 @@ pub(super) struct SeamSearch<'a> {
     pub pairs: SharedSlice<'a, Pair>,
     pub arbiters: SharedSlice<'a, Arbiter>,
     pub slop: Real,
+    pub break_distance: Real,
 }
 
 /// A shape that nothing can push near the body, and their arbiter if they touch.
@@ -92,7 +94,7 @@ impl Fixed<'_> {
 }
 
 /// Slots with contacts of the engine's own.
-fn own_slots(data: &ContactData) -> u8 {
+pub(super) fn own_slots(data: &ContactData) -> u8 {
     let own = |slot: &usize| data.usage_mask >> slot & 1 == 1 && !data.slots[*slot].world_normal;
     (0..SLOTS).filter(own).fold(0, |mask, slot| mask | 1 << slot)
 }
@@ -105,12 +107,15 @@ fn alike(data: &ContactData, mask: u8) -> u8 {
 }
 
 impl SeamSearch<'_> {
-    /// Hides the contacts at seams of some bodies, each named once.
-    pub fn run(&self, bodies: &[u32], pool: &mut StagePool) {
+    /// Hides the contacts at seams of some bodies, each named once, and hands on their loads of the last step, by body.
+    pub fn run(&self, bodies: &[u32], loads: &[Load], pool: &mut StagePool) {
         pool.run(bodies.len().div_ceil(BODIES_PER_BLOCK), |block| {
             let first = block * BODIES_PER_BLOCK;
             for &body in bodies.iter().skip(first).take(BODIES_PER_BLOCK) {
                 self.hide_contacts_of(body);
+                if let Ok(at) = loads.binary_search_by_key(&body, |load| load.body) {
+                    self.hand_on(&loads[at]);
+                }
             }
         });
     }
@@ -192,7 +197,7 @@ impl SeamSearch<'_> {
     }
 
     /// The pairs of a body with what nothing can push, and which side that is.
-    fn fixed_pairs(&self, body: u32) -> impl Iterator<Item = (u32, &Pair, usize)> {
+    pub(super) fn fixed_pairs(&self, body: u32) -> impl Iterator<Item = (u32, &Pair, usize)> {
         self.lists.of_body(body).filter_map(move |index| {
             // SAFETY: nobody changes a pair between two moving bodies here, and others are this body's.
             let pair = unsafe { self.pairs.get(index as usize) };
