@@ -74,7 +74,7 @@ const SAME_POINT: Real = 20.0;
 /// What a held point adds is taken for this many times as much.
 const HELD_GAIN: Real = 1.5;
 /// The share by which a held point that bears goes before one that stands off is this many times smaller.
-const HELD_SHARE: Real = 1.0 / 12.0;
+const HELD_SHARE: Real = 1.0 / 8.0;
 /// A held point stays the first of its group while it is less deep than the deepest by at most this many tolerances.
 const HELD_DEPTH: Real = 1.0;
 /// A held point touches up to this many times the separation up to which others do.
