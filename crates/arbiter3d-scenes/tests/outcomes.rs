@@ -204,7 +204,7 @@ fn nothing_wakes_in_an_idle_world() {
     assert_eq!(scene.world.hash(), hash);
 }
 
-/// Every kind of shape comes to rest on the waves: above them, hardly sunk in, hardly moving.
+/// Every kind of shape comes to rest on the waves: above them, hardly sunk in, asleep but for five of 192 at most.
 #[test]
 fn the_shape_parade_comes_to_rest() {
     let mut scene = built("shape_parade");
@@ -215,11 +215,12 @@ fn the_shape_parade_comes_to_rest() {
     let lowest = dynamic(world).iter().map(height).fold(f32::MAX, f32::min);
     assert!(lowest > -0.4, "{lowest} is below the waves' lowest point");
     assert!(world.deepest_penetration() < 0.02, "{}", world.deepest_penetration());
-    // Heaps in the valleys are one island each, which one rocking body keeps awake.
     let speeds = dynamic(world).iter().map(|id| world.body(*id).unwrap().linear_velocity().length()).sum::<f32>();
     let mean = speeds / dynamic(world).len() as f32;
     println!("{} awake, mean speed {mean} m/s", world.awake_count());
     assert!(mean < 0.02, "mean speed {mean} m/s");
+    // Heaps in the valleys are one island each, which one body that does not come to rest keeps awake.
+    assert!(world.awake_count() <= 5, "{} still awake", world.awake_count());
 }
 
 /// What is thrown up through one-way platforms stands on the floor that it was thrown at, and the lift carries its

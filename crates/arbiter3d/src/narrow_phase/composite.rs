@@ -10,7 +10,7 @@
 //!
 //! The number of a feature holds that of the part: see [`feature_of`].
 
-use super::mesh_points::{Candidate, Candidates, NO_FACET};
+use super::mesh_points::{Candidate, Candidates, Held, NO_FACET};
 use super::seam::{self, Bearing, Patch, Verdict};
 use super::{Manifold, ManifoldPoint, PairCache, collide_on};
 use crate::math::{Aabb, Pose, Real, Vec3, min};
@@ -71,7 +71,7 @@ pub(crate) fn collide(
     margin: Real,
     manifold: &mut Manifold,
 ) {
-    manifold.clear();
+    let held = Held::take(manifold, |point| point);
     let size = match [whole.inner_ball().1, other.inner_radius()] {
         [a, b] if a > 0.0 && b > 0.0 => min(a, b),
         [a, b] => crate::math::max(a, b),
@@ -99,7 +99,7 @@ pub(crate) fn collide(
         }
     }
     let mut materials = [[0; 2]; 4];
-    all.choose(|&Candidate { position, normal, separation, feature, triangle, .. }| {
+    all.choose(&held, |&Candidate { position, normal, separation, feature, triangle, .. }| {
         materials[manifold.points().len() & 3] = [triangle as u8, (triangle >> 8) as u8];
         manifold.push(ManifoldPoint { point1: position, normal, separation, feature });
     });

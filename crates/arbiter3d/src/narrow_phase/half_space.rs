@@ -2,7 +2,7 @@
 
 use super::clip::choose_four;
 use super::general::{EQUALLY_DEEP, MISSED};
-use super::mesh_points::{Candidate, Candidates, NO_FACET, position_number};
+use super::mesh_points::{Candidate, Candidates, Held, NO_FACET, position_number};
 use super::{Manifold, ManifoldPoint};
 use crate::math::{Pose, Real, Vec3, max, min};
 use crate::shape::Support;
@@ -10,9 +10,9 @@ use crate::shape::{FEATURE_POINTS, Feature, Shape, Surface};
 
 /// Contacts of a half-space (shape 1) with a convex shape or a surface; nothing for others.
 pub(crate) fn collide(shape: &Shape, pose: &Pose, margin: Real, manifold: &mut Manifold) {
-    manifold.clear();
+    let held = Held::take(manifold, |point| point);
     if let Some(surface) = Surface::of(shape) {
-        return collide_surface(surface, pose, margin, manifold);
+        return collide_surface(surface, pose, margin, (&held, manifold));
     }
     let Some(support) = Support::new(shape) else { return };
     let down = -pose.rotation.inverse_rotate(Vec3::Y);
@@ -50,7 +50,7 @@ pub(crate) fn collide(shape: &Shape, pose: &Pose, margin: Real, manifold: &mut M
 }
 
 /// The corners of a surface that are under the plane.
-fn collide_surface(surface: Surface<'_>, pose: &Pose, margin: Real, manifold: &mut Manifold) {
+fn collide_surface(surface: Surface<'_>, pose: &Pose, margin: Real, (held, manifold): (&Held, &mut Manifold)) {
     let around = surface.local_aabb();
     let size = max(surface.inner_radius(), 1e-3 * around.half_extents().length());
     let mut candidates = Candidates::new(0.02 * size);
@@ -70,7 +70,7 @@ fn collide_surface(surface: Surface<'_>, pose: &Pose, margin: Real, manifold: &m
         }
     });
     let mut materials = [[0; 2]; 4];
-    candidates.choose(|c| {
+    candidates.choose(held, |c| {
         materials[manifold.points().len() & 3][1] = surface.material(c.triangle as usize);
         push(c.position + Vec3::Y * c.separation, c.feature, manifold);
     });

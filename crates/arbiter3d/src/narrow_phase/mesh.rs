@@ -10,7 +10,7 @@
 //! Nothing is lost between neighbours: a triangle may leave a contact to the neighbour that reaches further, but
 //! if no triangle then reports a touch although some overlap the shape, they are looked at again and push along their faces.
 
-use super::mesh_points::{Candidate, Candidates};
+use super::mesh_points::{Candidate, Candidates, Held};
 use super::triangle::{Frame, Group, Reach, Solid};
 use super::triangle_general::General;
 use super::triangle_lanes::Near;
@@ -28,7 +28,6 @@ const BEHIND: Real = 0.1;
 
 /// Contacts of a mesh (shape 1, whose frame the manifold is in) and a convex shape placed in that frame by `pose`.
 pub(crate) fn collide(mesh: Surface<'_>, convex: &Shape, pose: &Pose, margin: Real, manifold: &mut Manifold) {
-    manifold.clear();
     let aabb = convex.aabb(pose).expand(margin);
     let mut contact = Contact { mesh, pose, aabb, margin, manifold };
     match convex {
@@ -42,6 +41,8 @@ pub(crate) fn collide(mesh: Surface<'_>, convex: &Shape, pose: &Pose, margin: Re
         _ => {
             if let Some(support) = Support::new(convex) {
                 contact.gather(&mut General::new(support), pose.rotation.to_mat3());
+            } else {
+                contact.manifold.clear();
             }
         }
     }
@@ -62,6 +63,7 @@ impl Contact<'_> {
         let inner = solid.inner_radius();
         let scale = if self.margin > 0.0 { min(self.margin, inner) } else { 0.02 * inner };
         let frame = Frame { rotation, inverse: rotation.transpose(), position: self.pose.position, scale };
+        let held = Held::take(self.manifold, |point| frame.inverse * (point - frame.position));
         let mut reach = Reach { margin: self.margin, scale, second_look: false };
         solid.place(&frame);
         let mut candidates = Candidates::new(0.02 * scale);
@@ -72,7 +74,7 @@ impl Contact<'_> {
         }
         let (mesh, manifold, mut materials) = (self.mesh, &mut *self.manifold, [[0; 2]; 4]);
         let many = mesh.has_materials();
-        candidates.choose(|candidate| {
+        candidates.choose(&held, |candidate| {
             if many {
                 materials[manifold.points().len() & 3][0] = mesh.material(candidate.triangle as usize);
             }

@@ -8,7 +8,14 @@
 //! point; the remaining places go where they add most, points that touch before those that do not: the square of a length
 //! for the second point of a group, twice the area for the third and the fourth. So a box on a floor keeps its four corners,
 //! a box in a groove two on each side.
+//!
+//! Where more than four points bear a body, the choice among them decides where it comes to rest, and there another choice may
+//! be the better one. So points that go on from those of the last step, by their features or by where they are on either
+//! shape (what was the crossing of two edges is where a face ends in the next step), are *held*: another one has to be deeper
+//! or wider by a margin to take their place, and a held one that bears is given up for one that stands off only if it adds
+//! next to nothing. Without that, thin plates on waves went to and fro between two choices and never slept.
 
+use super::Manifold;
 use crate::math::{Real, Vec3, max, min, tangents};
 use crate::storage::FixedList;
 
@@ -72,6 +79,16 @@ const BEARING_SHARES: [Real; 4] = [0.05, 0.5, 0.5, 1.0];
 const STANDS_OFF: Real = 2.5;
 /// A fourth point that adds less to the area of three than this share is not worth moving one for.
 const WORTH_WIDENING: Real = 0.1;
+/// A candidate goes on from a point of the last step that is no more than this many tolerances away.
+const SAME_POINT: Real = 20.0;
+/// What a held point adds is taken for this many times as much.
+const HELD_GAIN: Real = 1.5;
+/// The share by which a held point that bears goes before one that stands off is this many times smaller.
+const HELD_SHARE: Real = 1.0 / 8.0;
+/// A held point stays the first of its group while it is less deep than the deepest by at most this many tolerances.
+const HELD_DEPTH: Real = 1.0;
+/// A held point touches up to this many times the separation up to which others do.
+const HELD_BEARING: Real = 2.0;
 /// Mask of all groups.
 const ALL_GROUPS: u8 = u8::MAX;
 
@@ -82,6 +99,51 @@ pub(super) struct Candidates {
     tolerance: Real,
     /// The least separation of all points.
     deepest: Real,
+    /// By point: the place of the held point that it goes on from, or [`NOT_HELD`].
+    places: [u8; CAPACITY],
+}
+
+/// Points of the last step, in the frame of the candidates.
+pub(super) struct Held {
+    list: FixedList<HeldPoint, 4>,
+}
+
+#[derive(Clone, Copy)]
+struct HeldPoint {
+    /// On the two shapes, as they stand now.
+    sides: [Vec3; 2],
+    feature: u32,
+}
+
+/// Stands for no point among those held.
+const NOT_HELD: u8 = 4;
+
+impl Held {
+    /// Takes the points out of a manifold; `place` brings a point into the frame of the candidates.
+    #[inline(always)]
+    pub(super) fn take(manifold: &mut Manifold, place: impl Fn(Vec3) -> Vec3) -> Self {
+        let mut list = FixedList::new();
+        for point in manifold.points() {
+            list.push(HeldPoint { sides: [place(point.point1), place(point.point2())], feature: point.feature });
+        }
+        manifold.clear();
+        Self { list }
+    }
+
+    /// Which of them a candidate goes on from: the one of the same features, or the first on either shape by less than
+    /// `distance`. [`NOT_HELD`] if none.
+    fn place(&self, candidate: &Candidate, distance: Real) -> u8 {
+        let held = self.list.as_slice();
+        if let Some(place) = held.iter().position(|point| point.feature == candidate.feature) {
+            return place as u8;
+        }
+        let sides = [candidate.position, candidate.position + candidate.normal * candidate.separation];
+        let near = |point: &HeldPoint| {
+            let apart = |side: usize| (point.sides[side] - sides[side]).length_squared();
+            min(apart(0), apart(1)) < distance * distance
+        };
+        held.iter().position(near).map_or(NOT_HELD, |place| place as u8)
+    }
 }
 
 /// Points by group.
@@ -106,7 +168,7 @@ impl Candidates {
     // Inlined, so that the list is made where it stays.
     #[inline(always)]
     pub(super) fn new(tolerance: Real) -> Self {
-        Self { list: FixedList::new(), tolerance, deepest: Real::MAX }
+        Self { list: FixedList::new(), tolerance, deepest: Real::MAX, places: [NOT_HELD; CAPACITY] }
     }
 
     /// The least separation of all points that were added, also of those dropped since.
@@ -128,10 +190,17 @@ impl Candidates {
         self.list.push(candidate);
     }
 
-    /// Hands out the four points that matter most, or fewer.
-    pub(super) fn choose(&mut self, mut take: impl FnMut(&Candidate)) {
+    /// Hands out the four points that matter most, or fewer; of those that matter about as much, the ones that go on from
+    /// points of the last step.
+    pub(super) fn choose(&mut self, held: &Held, mut take: impl FnMut(&Candidate)) {
         if self.list.as_slice().is_empty() {
             return;
+        }
+        // Of four or fewer none is given up.
+        if self.list.as_slice().len() > 4 && !held.list.as_slice().is_empty() {
+            for (place, candidate) in self.places.iter_mut().zip(self.list.as_slice()) {
+                *place = held.place(candidate, SAME_POINT * self.tolerance);
+            }
         }
         self.unite_normals();
         let groups = self.group(4);
@@ -142,9 +211,7 @@ impl Candidates {
         let (touching, limit) = self.touching(&chosen, groups.count());
         for _ in groups.count()..4 {
             let next = match self.most_useful(&groups, &chosen, touching, limit) {
-                (Some(bearing), Some(widest))
-                    if bearing.2 >= BEARING_SHARES[chosen.counts[bearing.0] - 1] * widest.2 =>
-                {
+                (Some(bearing), Some(widest)) if bearing.2 >= self.bearing_share(&chosen, bearing) * widest.2 => {
                     Some(bearing)
                 }
                 (_, Some(widest)) => Some(widest),
@@ -164,13 +231,28 @@ impl Candidates {
         }
     }
 
+    /// How much of what the widest would add a point that touches has to add.
+    fn bearing_share(&self, chosen: &Chosen, (group, index, _): Gain) -> Real {
+        let share = BEARING_SHARES[chosen.counts[group] - 1];
+        if self.is_held(index) { HELD_SHARE * share } else { share }
+    }
+
+    /// Whether a candidate goes on from a point of the last step.
+    fn is_held(&self, index: usize) -> bool {
+        self.places[index] < NOT_HELD
+    }
+
     /// The groups that come about as near as the nearest one, a bit for each, and the separation up to which points do:
     /// what stands off (a wall beside a box on a floor) bears nothing yet, and one point is enough to stop at it.
     fn touching(&self, chosen: &Chosen, groups: usize) -> (u8, Real) {
         let nearest = |group: usize| self.list.as_slice()[chosen.points[group][0]].separation;
         let least = (0..groups).fold(Real::MAX, |m, group| min(m, nearest(group)));
         let limit = max(least, 0.0) + STANDS_OFF * self.tolerance;
-        ((0..groups).filter(|&group| nearest(group) <= limit).fold(0, |mask, group| mask | 1 << group), limit)
+        let touches = |group: &usize| {
+            let held = self.is_held(chosen.points[*group][0]);
+            nearest(*group) <= if held { HELD_BEARING * limit } else { limit }
+        };
+        ((0..groups).filter(touches).fold(0, |mask, group| mask | 1 << group), limit)
     }
 
     /// Where only three places were left for a patch of four corners, the middle between the fourth and its nearest
@@ -270,14 +352,24 @@ impl Candidates {
         all.filter(move |(i, _)| groups.of[*i] as usize == group)
     }
 
-    /// The deepest point of a group. Of several that are equally deep, an outermost one: a corner of the contact patch
-    /// rather than a point inside it (where parts of a floor meet under the patch), and the same one in every step.
+    /// The deepest point of a group, or the first held one that is about as deep. Of several that are equally deep, an
+    /// outermost one: a corner of the contact patch rather than a point inside it (where parts of a floor meet under the
+    /// patch), and the same one in every step.
     fn deepest_of(&self, groups: &Groups, group: usize) -> usize {
         let (mut least, mut sum, mut count) = (Real::MAX, Vec3::ZERO, 0.0);
         for (_, candidate) in self.members(groups, group) {
             least = min(least, candidate.separation);
             sum += candidate.position;
             count += 1.0;
+        }
+        let mut first = (0, NOT_HELD);
+        for (i, candidate) in self.members(groups, group) {
+            if self.places[i] < first.1 && candidate.separation <= least + HELD_DEPTH * self.tolerance {
+                first = (i, self.places[i]);
+            }
+        }
+        if first.1 < NOT_HELD {
+            return first.0;
         }
         let middle = sum * (1.0 / count);
         let (t1, t2) = tangents(groups.normal(group));
@@ -308,7 +400,11 @@ impl Candidates {
                 continue;
             }
             let corners = &corners[group][..chosen.counts[group]];
-            let gain = gain(corners, candidate.position, groups.normal(group), self.tolerance);
+            let mut gain = gain(corners, candidate.position, groups.normal(group), self.tolerance);
+            let mut limit = limit;
+            if self.is_held(i) {
+                (gain, limit) = (HELD_GAIN * gain, HELD_BEARING * limit);
+            }
             if gain > most[0] * TIE && candidate.separation <= limit {
                 (most[0], near) = (gain, Some((group, i, gain)));
             }

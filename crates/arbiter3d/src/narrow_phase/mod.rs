@@ -85,10 +85,14 @@ pub fn collide(
     cache: &mut PairCache,
     manifold: &mut Manifold,
 ) {
+    manifold.clear();
     collide_on(SimdLevel::best(), (shape1, shape2), pose, margin, (cache, manifold));
 }
 
 /// [`collide`] with the instructions of a level; the result is the same bits for all.
+///
+/// If one of the shapes [chooses among many points](keeps_points), the manifold may hold the points of the last step, each
+/// as far as its two sides are apart now: of points that serve about as well, those that go on from them are chosen.
 #[inline(always)]
 pub(crate) fn collide_on(
     level: SimdLevel,
@@ -102,6 +106,7 @@ pub(crate) fn collide_on(
     } else {
         // The plain inverse would cost a pebble on a hall its last digits.
         let inverse = if rank(shape2) == GENERAL { exact_inverse(pose) } else { pose.inverse() };
+        mirror(&inverse, manifold);
         collide_sorted(level, (shape2, shape1), &inverse, margin, (cache, manifold));
         mirror(pose, manifold);
     }
@@ -112,6 +117,11 @@ fn exact_inverse(pose: &Pose) -> Pose {
     let q = pose.rotation;
     let q = DQuat::from_xyzw(q.x.into(), q.y.into(), q.z.into(), q.w.into()).normalize();
     Pose::new(-(q.conjugate() * pose.position.as_dvec3()).as_vec3(), pose.rotation.conjugate())
+}
+
+/// Whether contacts with a shape are chosen among those of its many parts, so that the choice may go on from the last one.
+pub(crate) fn keeps_points(shape: &Shape) -> bool {
+    matches!(shape, Shape::Mesh(_) | Shape::HeightField(_) | Shape::Voxels(_) | Shape::Compound(_))
 }
 
 /// Rank of shapes without a kernel of their own.

@@ -21,7 +21,7 @@
 //! have no features near each other and touch nothing. The points go through the same choice as those of a mesh with a
 //! convex shape (`mesh_points`).
 
-use super::mesh_points::{Candidate, Candidates, NO_FACET, position_number};
+use super::mesh_points::{Candidate, Candidates, Held, NO_FACET, position_number};
 use super::{Manifold, ManifoldPoint};
 use crate::math::{Aabb, Pose, Real, Vec3, max, max3, min, min3};
 use crate::shape::{Surface, Surroundings, distance_squared};
@@ -40,7 +40,7 @@ const MOST_FACES: usize = 12;
 
 /// Contacts of surface `a` (shape 1) and surface `b`, which `pose` places in the frame of `a`.
 pub(super) fn collide((a, b): (Surface<'_>, Surface<'_>), pose: &Pose, margin: Real, manifold: &mut Manifold) {
-    manifold.clear();
+    let held = Held::take(manifold, |point| point);
     let (box_a, box_b) = (a.local_aabb().expand(margin), b.local_aabb().transform(pose).expand(margin));
     if !box_a.overlaps(&box_b) {
         return;
@@ -65,7 +65,7 @@ pub(super) fn collide((a, b): (Surface<'_>, Surface<'_>), pose: &Pose, margin: R
     }
     let mut materials = [[0; 2]; 4];
     let many = a.has_materials() || b.has_materials();
-    candidates.choose(|c| {
+    candidates.choose(&held, |c| {
         if many {
             let on_b = inverse.transform_point(c.position + c.normal * c.separation);
             let found = [material_at(a, c.position, scale), material_at(b, on_b, scale)];

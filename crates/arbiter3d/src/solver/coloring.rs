@@ -59,7 +59,7 @@ impl RowSource {
     /// No row: an empty lane.
     pub const NONE: Self = Self { arbiter: u32::MAX, slots: 0, part: RowPart::Later, extra: false, color: 0 };
 
-    /// Whether rolling resistance acts here: once an arbiter.
+    /// Whether the rolling impulse of the last step goes on here, and is told from here: once an arbiter.
     #[inline(always)]
     pub fn is_first(self) -> bool {
         self.part != RowPart::Later

@@ -117,7 +117,7 @@ fn features_of(sources: &[RowSource], context: &PrepareContext<'_>) -> RowFeatur
     for source in sources {
         let data = &context.arbiters[source.arbiter as usize].data;
         features.restitution |= data.restitution > 0.0 || data.other_slots != 0 && data.other_restitution > 0.0;
-        features.rolling |= source.is_first() && data.rolling_resistance > 0.0;
+        features.rolling |= data.rolling_resistance > 0.0;
         features.conveyor |= data.tangent_velocity != Vec3::ZERO;
         features.anisotropic |= data.flags & ANISOTROPIC != 0;
     }
@@ -476,8 +476,9 @@ fn prepare_extra<W: Lanes<L>, const L: usize, const P: usize, const C: usize>(
         extra.restitution.set(lane, if other { data.other_restitution } else { data.restitution });
         extra.target1.set(lane, data.tangent_velocity.dot(t1.get(lane)));
         extra.target2.set(lane, data.tangent_velocity.dot(t2.get(lane)));
-        if source.is_first() && data.rolling_resistance > 0.0 {
-            extra.rolling_resistance.set(lane, data.rolling_resistance);
+        // Each row resists under its own load; what is carried over from step to step starts in the first.
+        extra.rolling_resistance.set(lane, data.rolling_resistance);
+        if source.is_first() {
             extra.rolling_impulse.set(lane, data.rolling_impulse);
         }
     }

@@ -12,7 +12,9 @@ use super::contacts::{FrameRecords, PairFrame, Place, Places, WideFrame, turn_le
 use super::{Begin, CollideContext, News};
 use crate::arbiter::{Arbiter, ArbiterKey, ContactData, NONE, TANGENT_VELOCITY_OVERRIDDEN};
 use crate::math::{Pose, Real, Rotation, Vec3, max, min};
-use crate::narrow_phase::{CuboidLanes, CuboidPair, Manifold, NearCuboids, WideManifold, collide_on};
+use crate::narrow_phase::{
+    CuboidLanes, CuboidPair, Manifold, ManifoldPoint, NearCuboids, WideManifold, collide_on, keeps_points,
+};
 use crate::parallel::{BlockList, SharedSlice};
 use crate::shape::Shape;
 use crate::simd::{Kernel, LanePose, LaneRotation, LaneVec3, Lanes, prefetch};
@@ -333,8 +335,12 @@ impl<W: Lanes<L>, const L: usize> BlockKernel<'_, W, L> {
         let pair = self.pairs.pair(fresh.pair);
         let [s1, s2] = pair.shapes.map(|slot| &context.shapes[slot as usize]);
         let relative = shapes_relative(&fresh.between, s1, s2);
-        let (mut manifold, margin) = (Manifold::EMPTY, context.margin(pair));
-        let kept = (&mut pair.cache, &mut manifold);
+        let mut manifold = Manifold::EMPTY;
+        if pair.arbiter != NONE && (keeps_points(&s1.geometry) || keeps_points(&s2.geometry)) {
+            self.recall(fresh, &mut manifold);
+        }
+        let pair = self.pairs.pair(fresh.pair);
+        let (margin, kept) = (context.margin(pair), (&mut pair.cache, &mut manifold));
         collide_on(context.level, (&s1.geometry, &s2.geometry), &relative, margin, kept);
         if !context.filters.passes_contact(pair, (context.shapes, context.bodies), &mut manifold) {
             manifold.clear();
@@ -353,6 +359,19 @@ impl<W: Lanes<L>, const L: usize> BlockKernel<'_, W, L> {
         let pair = self.pairs.shared(fresh.pair);
         let places = Places::of_manifold(&manifold, &PairFrame::new(pair, context.shapes, context.solver));
         self.settle(fresh, &places);
+    }
+
+    /// Puts the contacts of the last step into a manifold, as they stand now.
+    fn recall(&mut self, fresh: &Fresh, manifold: &mut Manifold) {
+        let shapes = self.context.shapes;
+        let (pair, arbiter) = self.pairs.pair_and_arbiter(fresh.pair);
+        let Some(arbiter) = arbiter else { return };
+        let to_shape = shapes[pair.shapes[0] as usize].from_center.inverse();
+        for (_, contact) in arbiter.data.contacts() {
+            let (anchor1, anchor2) = (contact.local_anchor1, fresh.between.transform_point(contact.local_anchor2));
+            let (point1, normal) = (to_shape.transform_point(anchor1), to_shape.rotation.rotate(anchor2 - anchor1));
+            manifold.push(ManifoldPoint { point1, normal, separation: 1.0, feature: contact.feature });
+        }
     }
 
     /// Other parts of the surfaces touch than before.
