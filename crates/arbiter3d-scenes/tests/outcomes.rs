@@ -204,23 +204,41 @@ fn nothing_wakes_in_an_idle_world() {
     assert_eq!(scene.world.hash(), hash);
 }
 
-/// Every kind of shape comes to rest on the waves: above them, hardly sunk in, asleep but for five of 192 at most.
+/// Every kind of shape comes to rest on the waves: above them, hardly sunk in, and of 960 bodies no more than six go on rocking.
 #[test]
 fn the_shape_parade_comes_to_rest() {
-    let mut scene = built("shape_parade");
-    run(&mut scene, 900);
+    let restless: usize = (0..5).map(restless_in_parade).sum();
+    assert!(restless <= 6, "{restless} go on rocking");
+}
+
+/// Bodies of a parade that move for most of its fifteenth second. Heaps in the valleys are one island each, which one of them
+/// keeps awake: so they are counted rather than those awake.
+fn restless_in_parade(seed: u64) -> usize {
+    let options = SceneOptions { seed, ..SceneOptions::default() };
+    let mut scene = find("shape_parade").unwrap().build(&options).unwrap();
+    run(&mut scene, 840);
+    let ids = dynamic(&scene.world);
+    let mut moving = vec![0; ids.len()];
+    for _ in 0..60 {
+        run(&mut scene, 1);
+        for (count, id) in moving.iter_mut().zip(&ids) {
+            let body = scene.world.body(*id).unwrap();
+            let speed = body.linear_velocity().length() + 0.3 * body.angular_velocity().length();
+            *count += u32::from(speed > 0.05);
+        }
+    }
     let world = &scene.world;
     // An origin may be at a shape's corner: its centre of mass is inside.
     let height = |id: &BodyId| world.body(*id).unwrap().center_of_mass().y;
-    let lowest = dynamic(world).iter().map(height).fold(f32::MAX, f32::min);
-    assert!(lowest > -0.4, "{lowest} is below the waves' lowest point");
-    assert!(world.deepest_penetration() < 0.02, "{}", world.deepest_penetration());
-    let speeds = dynamic(world).iter().map(|id| world.body(*id).unwrap().linear_velocity().length()).sum::<f32>();
-    let mean = speeds / dynamic(world).len() as f32;
-    println!("{} awake, mean speed {mean} m/s", world.awake_count());
-    assert!(mean < 0.02, "mean speed {mean} m/s");
-    // Heaps in the valleys are one island each, which one body that does not come to rest keeps awake.
-    assert!(world.awake_count() <= 5, "{} still awake", world.awake_count());
+    let lowest = ids.iter().map(height).fold(f32::MAX, f32::min);
+    assert!(lowest > -0.4, "seed {seed}: {lowest} is below the waves' lowest point");
+    assert!(world.deepest_penetration() < 0.02, "seed {seed}: {}", world.deepest_penetration());
+    let speeds = ids.iter().map(|id| world.body(*id).unwrap().linear_velocity().length()).sum::<f32>();
+    let mean = speeds / ids.len() as f32;
+    assert!(mean < 0.02, "seed {seed}: mean speed {mean} m/s");
+    let restless = moving.iter().filter(|&&count| count > 30).count();
+    println!("seed {seed}: {} awake, {restless} restless, mean speed {mean} m/s", world.awake_count());
+    restless
 }
 
 /// What is thrown up through one-way platforms stands on the floor that it was thrown at, and the lift carries its

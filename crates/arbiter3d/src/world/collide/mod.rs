@@ -199,7 +199,7 @@ impl World {
             return;
         }
         let (search, awake, bearings, _) = self.seam_search();
-        let several = || awake.iter().filter(|&&body| bearings[body as usize] > 1);
+        let several = || awake.iter().filter(|&&body| bearings.get(body as usize).is_some_and(|&count| count > 1));
         storage::reserve(loads, awake.len());
         loads.extend(several().filter_map(|&body| search.load_of(body)));
         loads.sort_unstable_by_key(|load| load.body);
