@@ -241,6 +241,31 @@ fn restless_in_parade(seed: u64) -> usize {
     restless
 }
 
+/// What is held by continuous collision moves on: nothing that is faster than a metre a second stays where it is for more than ten
+/// steps of the first four seconds.
+#[test]
+fn nothing_hangs_where_it_touches() {
+    for seed in [0, 11, 34, 44] {
+        let options = SceneOptions { seed, ..SceneOptions::default() };
+        let mut scene = find("shape_parade").unwrap().build(&options).unwrap();
+        let ids = dynamic(&scene.world);
+        let mut held = vec![0; ids.len()];
+        for _ in 0..240 {
+            let before: Vec<Vec3> = ids.iter().map(|id| scene.world.body(*id).unwrap().center_of_mass()).collect();
+            run(&mut scene, 1);
+            for ((count, id), before) in held.iter_mut().zip(&ids).zip(&before) {
+                let body = scene.world.body(*id).unwrap();
+                let speed = body.linear_velocity().length();
+                let moved = (body.center_of_mass() - *before).length();
+                *count += u32::from(speed > 1.0 && moved < 0.2 * speed / 60.0);
+            }
+        }
+        for (count, id) in held.iter().zip(&ids) {
+            assert!(*count <= 10, "seed {seed}: {id:?} hangs for {count} steps");
+        }
+    }
+}
+
 /// What is thrown up through one-way platforms stands on the floor that it was thrown at, and the lift carries its
 /// load.
 #[test]

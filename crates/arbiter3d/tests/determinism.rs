@@ -23,13 +23,13 @@ const GOLDEN: [(&str, u64); 10] = [
     ("pile", 0x7900_4ca1_ad6b_f33e),
     ("hulls", 0x9585_7ac8_52b6_5294),
     ("mesh rain", 0xe1f9_7975_6a70_c27b),
-    ("bullets", 0x8279_b06e_ccde_a574),
+    ("bullets", 0xc13b_8bc1_c5e0_ca5d),
     ("custom contacts", 0x770f_f93e_d37a_7820),
-    ("coming and going", 0xc5bf_8ce9_e9cd_3e73),
-    ("surfaces", 0xe89f_c692_d409_d94d),
-    ("rods and bullets", 0xbe62_5de0_9823_f51a),
+    ("coming and going", 0xb070_2f44_4310_0f4a),
+    ("surfaces", 0x51d1_fc05_f301_3131),
+    ("rods and bullets", 0xd0f5_c9a0_990b_4ac8),
     ("compounds and voxels", 0x4a81_354e_cdcb_ed7d),
-    ("mixed convex", 0xde11_7670_0637_3a97),
+    ("mixed convex", 0x211d_e0e0_248f_fe07),
 ];
 
 /// A scene: how it begins, and what is done before each step.

@@ -4,8 +4,9 @@
 //! shapes, piece by piece ([`piece`]), are swept from where they were to where they are ([`way`]) against the static tree and the
 //! kinematic shapes; at the first impact the body stays where it came within a slop of touching, with the velocity that it had
 //! there. Contact is then found in the next step, which turns the velocity away. The rest of the step's motion is lost: to go on
-//! would be to leave the place where it hits. (Bullets lose nothing: see [`bullets`].) Only a body of
-//! many pieces that was in contact already goes on, along what holds it: some of its pieces may be held in every step.
+//! would be to leave the place where it hits. (Bullets lose nothing: see [`bullets`].) A body that was in contact already
+//! goes on along what holds it: it might be held in every step, and hang there while its speed grows. Only one that turns far
+//! in the step, and is no body of many pieces, stays: a thin rod that whirls would be worked through a wall.
 //!
 //! Every piece has a core, which is thinner by half its inner radius. Only a shape whose core would hit is stopped:
 //! what merely slides or rolls on a floor comes near ever new triangles of it, and must not be held. A shape that comes from
@@ -324,7 +325,8 @@ impl ImpactSearch<'_> {
         let first = self.first_stop(slots, &way, self.kinematic)?;
         let (time, normal) = (first.hit.time, first.hit.normal);
         let Some(carried) = first.carried else {
-            if first.hit.touches && slots.iter().any(|&slot| has_pieces(&self.shapes[slot as usize].geometry)) {
+            let has_many = || slots.iter().any(|&slot| has_pieces(&self.shapes[slot as usize].geometry));
+            if first.hit.touches && (way.parts == 1 || has_many()) {
                 return Some(self.slide(body, &way, first.hit));
             }
             // What a contact has held for all of the step has gained nothing.
@@ -337,7 +339,7 @@ impl ImpactSearch<'_> {
         Some(Held { way: Way::still(at), normal, lost: 0.0 })
     }
 
-    /// Lets a body of many pieces go on along what holds it. It has had a contact with that for all of the step, so its
+    /// Lets a body go on along what holds it. It has had a contact with that for all of the step, so its
     /// velocity is what the contact has made of it; only what is new (of a body that comes from afar) has to be met where it is.
     ///
     /// What is left of the way has its part towards the obstacle taken out; where turning alone is what is held, the body
