@@ -290,11 +290,23 @@ impl TriangleMesh {
     #[inline]
     pub(crate) fn for_each_facet(&self, aabb: &Aabb, mut visit: impl FnMut(usize)) {
         self.tree.query(aabb, |index| {
-            let [a, b, c] = self.corners(index);
-            if Aabb::new(min3(a, min3(b, c)), max3(a, max3(b, c))).overlaps(aabb) {
+            if self.facet_aabb(index).overlaps(aabb) {
                 visit(index);
             }
         });
+    }
+
+    #[inline(always)]
+    fn facet_aabb(&self, index: usize) -> Aabb {
+        let [a, b, c] = self.corners(index);
+        Aabb::new(min3(a, min3(b, c)), max3(a, max3(b, c)))
+    }
+
+    /// Whether the box of a triangle overlaps the given one: the search ends with the first that does.
+    pub(crate) fn meets_facet(&self, aabb: &Aabb) -> bool {
+        let mut search = FirstFacet { mesh: self, aabb, found: false };
+        self.tree.descend(Real::MAX, &mut search);
+        search.found
     }
 
     /// Shows the leaves of the tree whose boxes overlap the given one.
@@ -425,6 +437,30 @@ fn check(vertices: &[Vec3], triangles: &[[u32; 3]]) -> Result<(), ShapeError> {
         }
     }
     Ok(())
+}
+
+/// A search for any triangle whose box overlaps another one.
+struct FirstFacet<'a> {
+    mesh: &'a TriangleMesh,
+    aabb: &'a Aabb,
+    found: bool,
+}
+
+impl Descent for FirstFacet<'_> {
+    #[inline(always)]
+    fn distances<W: Lanes<LEAF>>(&self, low: &LaneVec3<W>, high: &LaneVec3<W>, _limit: Real) -> W {
+        let (min, max) = (self.aabb.min, self.aabb.max);
+        let x = (low.x - W::splat(max.x)).max(W::splat(min.x) - high.x);
+        let y = (low.y - W::splat(max.y)).max(W::splat(min.y) - high.y);
+        let z = (low.z - W::splat(max.z)).max(W::splat(min.z) - high.z);
+        x.max(y).max(z).if_positive(W::splat(Real::MAX), W::ZERO)
+    }
+
+    #[inline(always)]
+    fn leaf<W: Lanes<LEAF>>(&mut self, first: usize, count: usize, limit: Real) -> Real {
+        self.found = (first..first + count).any(|index| self.mesh.facet_aabb(index).overlaps(self.aabb));
+        if self.found { -1.0 } else { limit }
+    }
 }
 
 /// Twice the area along the normal.

@@ -1,6 +1,7 @@
 //! The world: bodies, shapes and arbiters by id, and the step that moves them.
 
 mod arbiters;
+mod bearings;
 mod bodies;
 mod collide;
 mod contact_events;
@@ -48,6 +49,7 @@ use crate::place_table::PlaceTable;
 use crate::simd::SimdLevel;
 use crate::solver::{ContactSolver, RowPlan, SolverBodies, contact_solver};
 use crate::storage;
+use bearings::Bearings;
 use bodies::Body;
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -95,8 +97,7 @@ pub struct World {
     free_pairs: Vec<u32>,
     /// The pairs of each body.
     pair_lists: EdgeLists,
-    /// By body: how many pairs it has with what nothing can push, sensors left out.
-    bearings: Vec<u32>,
+    bearings: Bearings,
     pair_set: PairSet,
     active_pairs: pairs::PlaceSet,
     arbiters: ArbiterStore,
@@ -188,7 +189,7 @@ impl World {
             pairs: Vec::new(),
             free_pairs: Vec::new(),
             pair_lists: EdgeLists::default(),
-            bearings: Vec::new(),
+            bearings: Bearings::default(),
             pair_set: PairSet::new(),
             active_pairs: pairs::PlaceSet::default(),
             arbiters: ArbiterStore::new(tag),

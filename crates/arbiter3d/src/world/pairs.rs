@@ -367,12 +367,12 @@ impl World {
         // SAFETY: old pairs keep their places, and each new place has been written.
         unsafe { self.pairs.set_len(count) };
         self.pair_lists.grow(count, self.bodies.len());
-        self.bearings.resize(self.bodies.len(), 0);
+        self.bearings.resize(self.bodies.len());
         for (nth, &Tie { bodies, active, borne }) in ties.iter().enumerate() {
             let place = place_of(nth);
             self.pair_lists.link(place, bodies);
             if borne != NONE {
-                self.bearings[borne as usize] += 1;
+                self.bearings.add(borne);
             }
             if active {
                 self.active_pairs.insert(place);
@@ -412,7 +412,7 @@ impl World {
         let (shapes, bodies, arbiter, overlapping) = (pair.shapes, pair.bodies, pair.arbiter, pair.overlapping);
         let borne = pair.borne();
         if let Some(body) = borne {
-            self.bearings[body as usize] -= 1;
+            self.bearings.remove(body);
         }
         if arbiter != NONE {
             self.end_arbiter(arbiter, reason);
@@ -466,11 +466,11 @@ impl World {
         for index in self.pair_lists.of_body(body) {
             let pair = &mut self.pairs[index as usize];
             if let Some(body) = pair.borne() {
-                self.bearings[body as usize] -= 1;
+                self.bearings.remove(body);
             }
             pair.note_borne(pair.bodies.map(|body| self.solver_bodies.states[body as usize].moves != 0));
             if let Some(body) = pair.borne() {
-                self.bearings[body as usize] += 1;
+                self.bearings.add(body);
             }
         }
     }

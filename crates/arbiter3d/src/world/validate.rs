@@ -67,7 +67,7 @@ impl World {
     }
 
     fn validate_pairs(&self) -> Result<(), String> {
-        let mut bearings = vec![0; self.bearings.len()];
+        let mut bearings = vec![0; self.bearings.counts().len()];
         for (index, pair) in self.pairs.iter().enumerate().filter(|(_, pair)| pair.alive) {
             let awake = pair.bodies.iter().any(|&body| self.bodies[body as usize].awake);
             if awake != pair.active {
@@ -89,7 +89,7 @@ impl World {
             }
             borne.into_iter().for_each(|body| bearings[body as usize] += 1);
         }
-        if bearings != self.bearings {
+        if bearings != self.bearings.counts() || !self.bearings.is_valid() {
             return Err(format!("pairs with what nothing can push: {:?}, not {bearings:?}", self.bearings));
         }
         Ok(())

@@ -17,6 +17,7 @@ mod seams;
 
 use super::World;
 use super::arbiters::{fresh_data, mix_shape_materials};
+use super::bearings::Bearings;
 use super::bodies::Body;
 use super::filters::UserFilters;
 use super::pairs::{PRE_SOLVE, Pair};
@@ -172,7 +173,7 @@ impl World {
             level: self.level,
             filters: &self.filters,
             moved: &self.moved_shapes,
-            bearings: &self.bearings,
+            bearings: self.bearings.counts(),
             dt,
         };
         let active = self.active_pairs.words();
@@ -195,11 +196,11 @@ impl World {
     /// Adds up the loads of bodies that several things bear which nothing can push.
     fn add_up_loads(&mut self, loads: &mut Vec<Load>) {
         loads.clear();
-        if self.bearings.iter().all(|&count| count < 2) {
+        if !self.bearings.any_several() {
             return;
         }
         let (search, awake, bearings, _) = self.seam_search();
-        let several = || awake.iter().filter(|&&body| bearings.get(body as usize).is_some_and(|&count| count > 1));
+        let several = || awake.iter().filter(|&&body| bearings.has_several(body));
         storage::reserve(loads, awake.len());
         loads.extend(several().filter_map(|&body| search.load_of(body)));
         loads.sort_unstable_by_key(|load| load.body);
@@ -218,7 +219,7 @@ impl World {
     }
 
     /// Also which bodies are awake, how many things by them nothing can push, and the threads.
-    fn seam_search(&mut self) -> (SeamSearch<'_>, &[u32], &[u32], &mut StagePool) {
+    fn seam_search(&mut self) -> (SeamSearch<'_>, &[u32], &Bearings, &mut StagePool) {
         let search = SeamSearch {
             shapes: &self.shapes,
             bodies: &self.bodies,

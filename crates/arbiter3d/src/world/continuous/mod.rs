@@ -450,7 +450,7 @@ impl ImpactSearch<'_> {
             };
             if clear {
                 let pose = self.bodies[other.body as usize].pose.mul(&other.pose);
-                mesh.for_each_facet(&around.transform(&pose.inverse()), |_| clear = false);
+                clear = !mesh.meets_facet(&around.transform(&pose.inverse()));
             }
         });
         clear
