@@ -429,18 +429,28 @@ impl ImpactSearch<'_> {
         }
     }
 
-    /// Whether nothing static is near the way of a shape but meshes, of which no triangle is: told by balls around the
-    /// centre of mass, long before the shape's own box is made.
+    /// Whether nothing static is near the way of a shape but meshes, of which no triangle is: told by balls, long before the
+    /// shape's own box is made. Without a `piece` all of them are meant.
     ///
-    /// A piece turns about the middle of its core, which goes straight beside the centre of mass and at its distance
-    /// from that one; so no point comes farther from the way of the centre than the farthest is from it at first, and
-    /// twice that distance. Without a `piece` all of them are meant.
+    /// A piece turns about the middle of its core, which goes straight: a ball around that middle holds the core, which is all
+    /// that stops it. Where the body turns far, or all pieces are meant, the ball is around the centre of mass. The middle goes
+    /// straight beside that one and at its distance from it; so no point comes farther from the way of the centre than
+    /// the farthest is from it at first, and twice that distance.
     fn is_clear(&self, shape: &ShapeSlot, piece: Option<&Piece<'_>>, way: &Way) -> bool {
-        let farthest = shape.middle.length() + shape.reach;
-        let pivot = piece.map_or(farthest, |piece| piece.place.transform_point(piece.middle()).length());
-        let reach = farthest + 2.0 * pivot;
-        let path = Aabb::from_points([way.start.position, way.end.position]);
-        let around = path.expand(reach + self.settings.speculative_distance + 2.0 * self.settings.slop);
+        let (ends, reach) = match piece {
+            Some(piece) if !Mover::turns_much(way) => {
+                let middle = piece.place.transform_point(piece.middle());
+                let ends = [&way.start, &way.end].map(|pose| pose.transform_point(middle));
+                (ends, piece.core.support.reach(piece.core.middle))
+            }
+            _ => {
+                let farthest = shape.middle.length() + shape.reach;
+                let pivot = piece.map_or(farthest, |piece| piece.place.transform_point(piece.middle()).length());
+                ([way.start.position, way.end.position], farthest + 2.0 * pivot)
+            }
+        };
+        let around =
+            Aabb::from_points(ends).expand(reach + self.settings.speculative_distance + 2.0 * self.settings.slop);
         let mut clear = true;
         self.broad_phase.query_static(&around, |slot| {
             let other = &self.shapes[slot as usize];
