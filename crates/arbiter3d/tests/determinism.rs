@@ -22,7 +22,7 @@ use common::*;
 const GOLDEN: [(&str, u64); 10] = [
     ("pile", 0x7900_4ca1_ad6b_f33e),
     ("hulls", 0x9585_7ac8_52b6_5294),
-    ("mesh rain", 0xe1f9_7975_6a70_c27b),
+    ("mesh rain", 0x8355_e47d_0a0d_ce7f),
     ("bullets", 0xc13b_8bc1_c5e0_ca5d),
     ("custom contacts", 0x770f_f93e_d37a_7820),
     ("coming and going", 0xb070_2f44_4310_0f4a),

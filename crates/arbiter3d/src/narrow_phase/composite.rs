@@ -71,7 +71,7 @@ pub(crate) fn collide(
     margin: Real,
     manifold: &mut Manifold,
 ) {
-    let held = Held::take(manifold, |point| point);
+    let held = Held::take(manifold);
     let size = match [whole.inner_ball().1, other.inner_radius()] {
         [a, b] if a > 0.0 && b > 0.0 => min(a, b),
         [a, b] => crate::math::max(a, b),
@@ -99,10 +99,14 @@ pub(crate) fn collide(
         }
     }
     let mut materials = [[0; 2]; 4];
-    all.choose(&held, |&Candidate { position, normal, separation, feature, triangle, .. }| {
-        materials[manifold.points().len() & 3] = [triangle as u8, (triangle >> 8) as u8];
-        manifold.push(ManifoldPoint { point1: position, normal, separation, feature });
-    });
+    all.choose(
+        &held,
+        |point| point,
+        |&Candidate { position, normal, separation, feature, triangle, .. }| {
+            materials[manifold.points().len() & 3] = [triangle as u8, (triangle >> 8) as u8];
+            manifold.push(ManifoldPoint { point1: position, normal, separation, feature });
+        },
+    );
     manifold.set_point_materials(&materials);
 }
 

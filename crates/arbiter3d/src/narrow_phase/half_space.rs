@@ -10,7 +10,7 @@ use crate::shape::{FEATURE_POINTS, Feature, Shape, Surface};
 
 /// Contacts of a half-space (shape 1) with a convex shape or a surface; nothing for others.
 pub(crate) fn collide(shape: &Shape, pose: &Pose, margin: Real, manifold: &mut Manifold) {
-    let held = Held::take(manifold, |point| point);
+    let held = Held::take(manifold);
     if let Some(surface) = Surface::of(shape) {
         return collide_surface(surface, pose, margin, (&held, manifold));
     }
@@ -70,10 +70,14 @@ fn collide_surface(surface: Surface<'_>, pose: &Pose, margin: Real, (held, manif
         }
     });
     let mut materials = [[0; 2]; 4];
-    candidates.choose(held, |c| {
-        materials[manifold.points().len() & 3][1] = surface.material(c.triangle as usize);
-        push(c.position + Vec3::Y * c.separation, c.feature, manifold);
-    });
+    candidates.choose(
+        held,
+        |point| point,
+        |c| {
+            materials[manifold.points().len() & 3][1] = surface.material(c.triangle as usize);
+            push(c.position + Vec3::Y * c.separation, c.feature, manifold);
+        },
+    );
     manifold.set_point_materials(&materials);
 }
 

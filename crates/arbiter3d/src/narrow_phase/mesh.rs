@@ -63,7 +63,7 @@ impl Contact<'_> {
         let inner = solid.inner_radius();
         let scale = if self.margin > 0.0 { min(self.margin, inner) } else { 0.02 * inner };
         let frame = Frame { rotation, inverse: rotation.transpose(), position: self.pose.position, scale };
-        let held = Held::take(self.manifold, |point| frame.inverse * (point - frame.position));
+        let held = Held::take(self.manifold);
         let mut reach = Reach { margin: self.margin, scale, second_look: false };
         solid.place(&frame);
         let mut candidates = Candidates::new(0.02 * scale);
@@ -74,7 +74,8 @@ impl Contact<'_> {
         }
         let (mesh, manifold, mut materials) = (self.mesh, &mut *self.manifold, [[0; 2]; 4]);
         let many = mesh.has_materials();
-        candidates.choose(&held, |candidate| {
+        let place = |point| frame.inverse * (point - frame.position);
+        candidates.choose(&held, place, |candidate| {
             if many {
                 materials[manifold.points().len() & 3][0] = mesh.material(candidate.triangle as usize);
             }

@@ -119,14 +119,23 @@ struct HeldPoint {
 const NOT_HELD: u8 = 4;
 
 impl Held {
-    /// Takes the points out of a manifold; `place` brings a point into the frame of the candidates.
+    /// Takes the points out of a manifold.
     #[inline(always)]
-    pub(super) fn take(manifold: &mut Manifold, place: impl Fn(Vec3) -> Vec3) -> Self {
+    pub(super) fn take(manifold: &mut Manifold) -> Self {
         let mut list = FixedList::new();
         for point in manifold.points() {
-            list.push(HeldPoint { sides: [place(point.point1), place(point.point2())], feature: point.feature });
+            list.push(HeldPoint { sides: [point.point1, point.point2()], feature: point.feature });
         }
         manifold.clear();
+        Self { list }
+    }
+
+    /// The same in the frame of the candidates, into which `place` brings a point.
+    fn placed(&self, place: impl Fn(Vec3) -> Vec3) -> Self {
+        let mut list = FixedList::new();
+        for point in self.list.as_slice() {
+            list.push(HeldPoint { sides: point.sides.map(&place), feature: point.feature });
+        }
         Self { list }
     }
 
@@ -191,13 +200,14 @@ impl Candidates {
     }
 
     /// Hands out the four points that matter most, or fewer; of those that matter about as much, the ones that go on from
-    /// points of the last step.
-    pub(super) fn choose(&mut self, held: &Held, mut take: impl FnMut(&Candidate)) {
+    /// points of the last step; `place` brings these into the frame of the candidates.
+    pub(super) fn choose(&mut self, held: &Held, place: impl Fn(Vec3) -> Vec3, mut take: impl FnMut(&Candidate)) {
         if self.list.as_slice().is_empty() {
             return;
         }
         // Of four or fewer none is given up.
         if self.list.as_slice().len() > 4 && !held.list.as_slice().is_empty() {
+            let held = held.placed(place);
             for (place, candidate) in self.places.iter_mut().zip(self.list.as_slice()) {
                 *place = held.place(candidate, SAME_POINT * self.tolerance);
             }
@@ -320,6 +330,7 @@ impl Candidates {
                 |c: &Candidate| c.is_on_face() && c.separation <= limit && c.normal.dot(point.normal) > SAME_NORMAL;
             if point.facet != ROLLING || !list.iter().any(bears) {
                 self.list.as_mut_slice()[kept] = point;
+                self.places[kept] = self.places[i];
                 kept += 1;
             }
         }

@@ -40,7 +40,7 @@ const MOST_FACES: usize = 12;
 
 /// Contacts of surface `a` (shape 1) and surface `b`, which `pose` places in the frame of `a`.
 pub(super) fn collide((a, b): (Surface<'_>, Surface<'_>), pose: &Pose, margin: Real, manifold: &mut Manifold) {
-    let held = Held::take(manifold, |point| point);
+    let held = Held::take(manifold);
     let (box_a, box_b) = (a.local_aabb().expand(margin), b.local_aabb().transform(pose).expand(margin));
     if !box_a.overlaps(&box_b) {
         return;
@@ -65,15 +65,19 @@ pub(super) fn collide((a, b): (Surface<'_>, Surface<'_>), pose: &Pose, margin: R
     }
     let mut materials = [[0; 2]; 4];
     let many = a.has_materials() || b.has_materials();
-    candidates.choose(&held, |c| {
-        if many {
-            let on_b = inverse.transform_point(c.position + c.normal * c.separation);
-            let found = [material_at(a, c.position, scale), material_at(b, on_b, scale)];
-            materials[manifold.points().len() & 3] = found;
-        }
-        let normal = c.normal * (1.0 / c.normal.length());
-        manifold.push(ManifoldPoint { point1: c.position, normal, separation: c.separation, feature: c.feature });
-    });
+    candidates.choose(
+        &held,
+        |point| point,
+        |c| {
+            if many {
+                let on_b = inverse.transform_point(c.position + c.normal * c.separation);
+                let found = [material_at(a, c.position, scale), material_at(b, on_b, scale)];
+                materials[manifold.points().len() & 3] = found;
+            }
+            let normal = c.normal * (1.0 / c.normal.length());
+            manifold.push(ManifoldPoint { point1: c.position, normal, separation: c.separation, feature: c.feature });
+        },
+    );
     if many {
         manifold.set_point_materials(&materials);
     }
